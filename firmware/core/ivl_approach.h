@@ -1,0 +1,30 @@
+/// @file ivl_approach.h
+/// Stage 5b: the approach generator.  A straight path in the x-z plane of W, its speed ramped with constant acceleration and then held.
+#ifndef IVL_APPROACH_H
+#define IVL_APPROACH_H
+#include "ivl_cfg.h"
+
+/// What the tracking controller is to follow.
+typedef struct
+{
+    ivl_vec3_t p_W_m;
+    ivl_vec3_t v_W_mps;
+    ivl_vec3_t a_W_mps2;
+} ivl_reference_t;
+
+typedef struct
+{
+    ivl_vec3_t p_W_m;       ///< present point of the path
+    float      dir_x;       ///< direction of the path in W, unit length
+    float      dir_z;
+    float      speed_mps;   ///< present speed along the path
+    float      target_mps;  ///< speed to be held
+} ivl_approach_t;
+
+/// Start a path at the present position with the present velocity component along it; a vehicle already at speed just holds it.
+/// @param[in] angle_rad  above horizontal, 0..pi/2
+void ivl_approach_begin(ivl_approach_t *approach, ivl_vec3_t p_WB_m, ivl_vec3_t v_WB_mps, float speed_mps, float angle_rad);
+
+/// Reference of this tick; then advance by one tick of dt_s.
+ivl_reference_t ivl_approach_next(const ivl_cfg_t *cfg, ivl_approach_t *approach, float dt_s);
+#endif  // IVL_APPROACH_H

@@ -1,0 +1,17 @@
+/// @file ivl_ceiling.h
+/// Stage 2: distance and closing speed of a ceiling of known height, d = h_ceil - z.
+#ifndef IVL_CEILING_H
+#define IVL_CEILING_H
+#include "ivl_sense.h"
+
+typedef struct
+{
+    float d_ceil_m;     ///< from the origin of B along the ceiling's normal; 0 if invalid
+    float v_close_mps;  ///< closing speed, -d(d)/dt; 0 if invalid
+    float age_s;        ///< age of the sample behind it
+    bool  valid;        ///< false: the distance must not be used
+} ivl_ceiling_t;
+
+/// @return .valid is true only for a sample of this tick with d in [d_ceil_m_min, d_ceil_m_max]
+ivl_ceiling_t ivl_ceiling_compute(const ivl_cfg_t *cfg, const ivl_sense_t *sense);
+#endif  // IVL_CEILING_H

@@ -1,0 +1,17 @@
+/// @file ivl_cues.h
+/// Stage 3: sensory cues of a flat ceiling, RREV and ventral flow [P eq. 1, 2].  Pure, O(1).
+#ifndef IVL_CUES_H
+#define IVL_CUES_H
+#include "ivl_ceiling.h"
+
+typedef struct
+{
+    float rrev_per_s;  ///< v_z / d, > 0 while closing; 0 if invalid
+    float of_y_radps;  ///< flow about body y of a level body, -v_x / d; 0 if invalid
+    bool  valid;       ///< false: the fields above must not be used
+} ivl_cues_t;
+
+/// Cues from the ceiling and the velocity of B in W.
+/// @return .valid is false if the ceiling is invalid or its distance not positive
+ivl_cues_t ivl_cues_compute(ivl_ceiling_t ceiling, ivl_vec3_t v_WB_mps);
+#endif  // IVL_CUES_H

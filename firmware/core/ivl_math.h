@@ -1,0 +1,81 @@
+/// @file ivl_math.h
+/// Vectors, rotations and the few functions that the core needs instead of libm.
+/// Only + - * /, sqrtf, fabsf and comparisons: the bits are the same on every IEEE-754 machine when contraction is off.  Pure, O(1).
+#ifndef IVL_MATH_H
+#define IVL_MATH_H
+#include <float.h>
+#include <math.h>
+
+#include "ivl_types.h"
+
+/// Rotation matrix by columns: the axes of B expressed in W.
+typedef struct
+{
+    ivl_vec3_t x, y, z;
+} ivl_axes_t;
+
+typedef struct
+{
+    float sin, cos;
+} ivl_sincos_t;
+
+static const float IVL_PI = 3.14159265f;
+static const float IVL_HALF_PI = 1.57079633f;
+
+/// True if |x| <= limit; false for NaN and infinity (limit finite).
+static inline bool ivl_within(float x, float limit)
+{
+    return fabsf(x) <= limit;
+}
+
+/// x limited to [lo, hi]; NaN gives lo, so that a bad value becomes the safe end.
+static inline float ivl_clamp(float x, float lo, float hi)
+{
+    return (x > lo) ? ((x < hi) ? x : hi) : lo;
+}
+
+static inline ivl_vec3_t ivl_vec3(float x, float y, float z)
+{
+    return (ivl_vec3_t){x, y, z};
+}
+
+static inline ivl_vec3_t ivl_add(ivl_vec3_t a, ivl_vec3_t b)
+{
+    return ivl_vec3(a.x + b.x, a.y + b.y, a.z + b.z);
+}
+
+static inline ivl_vec3_t ivl_sub(ivl_vec3_t a, ivl_vec3_t b)
+{
+    return ivl_vec3(a.x - b.x, a.y - b.y, a.z - b.z);
+}
+
+static inline ivl_vec3_t ivl_scale(ivl_vec3_t a, float s)
+{
+    return ivl_vec3(a.x * s, a.y * s, a.z * s);
+}
+
+static inline float ivl_dot(ivl_vec3_t a, ivl_vec3_t b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+static inline ivl_vec3_t ivl_cross(ivl_vec3_t a, ivl_vec3_t b)
+{
+    return ivl_vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
+
+/// True if every component lies in [-limit, limit]; false for NaN.
+static inline bool ivl_vec3_within(ivl_vec3_t a, float limit)
+{
+    return ivl_within(a.x, limit) && ivl_within(a.y, limit) && ivl_within(a.z, limit);
+}
+
+/// Body axes in W of a unit quaternion q_WB.
+ivl_axes_t ivl_axes_of(ivl_quat_t q_WB);
+
+/// Sine and cosine, absolute error below 1.5e-7 for |x| <= 100 rad; {0, 1} for anything else, NaN included.
+ivl_sincos_t ivl_sincos(float x_rad);
+
+/// Tangent, relative error below 4e-7 for |x| <= 1.5 rad; the argument is limited to that range (NaN: the lower end).
+float ivl_tan(float x_rad);
+#endif  // IVL_MATH_H

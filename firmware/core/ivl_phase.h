@@ -1,0 +1,29 @@
+/// @file ivl_phase.h
+/// Phases as a table: one row a phase says what the motors do, whether the trigger is live, and the exits in order of priority.
+#ifndef IVL_PHASE_H
+#define IVL_PHASE_H
+#include "ivl_state.h"
+
+/// What drives the motors.
+typedef enum
+{
+    IVL_DRIVE_OFF,
+    IVL_DRIVE_HOVER,     ///< track the commanded hover point
+    IVL_DRIVE_APPROACH,  ///< track the approach path
+    IVL_DRIVE_FLIP,      ///< front pair makes the policy's moment
+    IVL_DRIVE_ABORT      ///< track the abort point; off once the sensed state was lost
+} ivl_drive_t;
+
+/// Follow the exits of the table until the phase is stable (each phase at most once per tick), with the entry action of each phase.
+void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues);
+
+/// What drives the motors in the present phase.
+ivl_drive_t ivl_phase_drive(const ivl_state_t *state);
+
+/// Lower-case name of a phase ("approach"), "?" for a number that is none.  Static storage.
+const char *ivl_phase_name(ivl_phase_t phase);
+
+/// True if no motor can run again before a new request cycle (IDLE, then HOVER): in coast, attached, done, and in aborted once the sensed
+/// state was lost.
+bool ivl_motors_latched_off(const ivl_state_t *state);
+#endif  // IVL_PHASE_H

@@ -1,0 +1,51 @@
+/// @file ivl_sense.h
+/// Stage 1: the sensed state and the command, checked.  A tick's input is taken as a whole or not at all.
+#ifndef IVL_SENSE_H
+#define IVL_SENSE_H
+#include "ivl_cfg.h"
+
+// limits beyond which a value is called impossible; all are far outside what the vehicle can do
+#define IVL_SENSE_P_M_MAX 200.0f       ///< m, each coordinate
+#define IVL_SENSE_V_MPS_MAX 50.0f      ///< m/s, each component
+#define IVL_SENSE_W_RADPS_MAX 1000.0f  ///< rad/s, each component
+#define IVL_SENSE_F_MPS2_MAX 1.0e6f    ///< m/s^2, each component; high, since an impact is a spike
+#define IVL_SENSE_Q_NORM2_TOL 0.05f    ///< |q|^2 may differ from 1 by this much; it is normalised
+
+/// The input of one tick: now, one sensed state, one command.
+typedef struct
+{
+    uint64_t      t_us;       ///< now; must advance from tick to tick
+    uint64_t      t_pose_us;  ///< sampling instant of p, v
+    ivl_vec3_t    p_WB_m;
+    ivl_vec3_t    v_WB_mps;
+    ivl_quat_t    q_WB;
+    ivl_vec3_t    w_B_radps;
+    ivl_vec3_t    f_B_mps2;  ///< specific force (accelerometer)
+    ivl_command_t cmd;
+} ivl_in_t;
+
+typedef struct
+{
+    ivl_sample_t  sample;     ///< the last good sample, its quaternion normalised
+    ivl_command_t cmd;        ///< the last good command
+    float         age_s;      ///< age of the sample's position; grows by one tick per tick without a good input
+    float         up_z;       ///< z component in W of b_z: cosine of the tilt
+    uint64_t      t_last_us;  ///< clock of the previous tick
+    bool          fresh;      ///< this tick's input was good as a whole
+    bool          usable;     ///< a good sample exists and is not older than stale_s_max
+} ivl_sense_t;
+
+/// What was refused in one tick.
+typedef struct
+{
+    bool bad_pose;
+    bool bad_command;
+} ivl_sense_fault_t;
+
+/// No sample, request IDLE.
+void ivl_sense_reset(ivl_sense_t *sense);
+
+/// Take in one tick.  A good request is obeyed even if the sensed state is bad (an abort must always arrive).
+/// @param[in] dt_s  tick period, s
+ivl_sense_fault_t ivl_sense_update(const ivl_cfg_t *cfg, ivl_sense_t *sense, const ivl_in_t *in, float dt_s);
+#endif  // IVL_SENSE_H

@@ -1,0 +1,45 @@
+/// @file ivl_state.h
+/// Everything that the core remembers between ticks.  Owned by the caller, written only by the core.
+#ifndef IVL_STATE_H
+#define IVL_STATE_H
+#include "ivl_contact.h"
+#include "ivl_controller.h"
+#include "ivl_trigger.h"
+
+/// Counters of events; they never decrease (they wrap after 2^32).
+typedef struct
+{
+    uint32_t n_tick;
+    uint32_t n_bad_pose;        ///< ticks whose sensed state was refused
+    uint32_t n_bad_command;     ///< ticks whose command was refused
+    uint32_t n_policy_refused;  ///< policies refused: range or phase
+    uint32_t n_abort;           ///< entries into ABORTED
+    uint32_t n_trigger;         ///< triggers fired
+} ivl_diag_t;
+
+/// Values that follow from the configuration, made once by ivl_init.
+typedef struct
+{
+    float dt_s;
+    float tan_tilt_cmd_max;
+    float cos_tilt_abort;
+    bool  cfg_good;  ///< false: ivl_cfg_check refused the configuration, the core stays in IDLE
+} ivl_derived_t;
+
+typedef struct
+{
+    ivl_phase_t    phase;
+    uint32_t       n_phase_tick;  ///< ticks spent in this phase
+    bool           has_policy;    ///< a policy was committed
+    bool           triggered;     ///< the trigger has fired in this arm cycle
+    bool           abort_cut;     ///< ABORTED has lost the sensed state: motors stay off
+    ivl_derived_t  derived;
+    ivl_sense_t    sense;
+    ivl_policy_t   policy;
+    ivl_approach_t approach;
+    ivl_vec3_t     p_abort_W_m;  ///< where ABORTED hovers
+    ivl_contact_t  contact;
+    ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
+    ivl_diag_t     diag;
+} ivl_state_t;
+#endif  // IVL_STATE_H

@@ -1,0 +1,80 @@
+/// @file ivl_types.h
+/// Plain data types that every stage of the core shares: vectors, phases, requests, status, one sensed sample.
+/// Frames: W world, z up; B body, x forward, y left, z up.  SI units, radians, seconds; q_WB turns body vectors into world vectors.
+#ifndef IVL_TYPES_H
+#define IVL_TYPES_H
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct
+{
+    float x, y, z;
+} ivl_vec3_t;
+
+typedef struct
+{
+    float x, y, z, w;  ///< w is the scalar part
+} ivl_quat_t;
+
+/// Result of an operation that can be refused.  Zero is success, negative values are refusals.
+typedef enum
+{
+    IVL_OK = 0,
+    IVL_ERR_RANGE = -1,  ///< a value is not finite or lies outside its stated range
+    IVL_ERR_PHASE = -2   ///< not allowed in the present phase (for example after the trigger)
+} ivl_status_t;
+
+/// Phases of one landing; the numbers are part of the log format.  The transitions stand in the table of ivl_phase.c.
+typedef enum
+{
+    IVL_PHASE_IDLE,      ///< motors off, waiting for a request
+    IVL_PHASE_READY,     ///< hover at the commanded point
+    IVL_PHASE_APPROACH,  ///< accelerate to the commanded velocity and hold it; the trigger is live
+    IVL_PHASE_FLIP,      ///< front pair alone makes the policy's moment
+    IVL_PHASE_COAST,     ///< motors off, body rotates freely
+    IVL_PHASE_ATTACHED,  ///< motors off, contact or hanging was sensed
+    IVL_PHASE_DONE,      ///< motors off until the next request cycle
+    IVL_PHASE_ABORTED,   ///< level hover at the abort point while the sensed state is good, else motors off for good
+    IVL_PHASE_COUNT
+} ivl_phase_t;
+
+/// What the operator wants.  A level, not an edge: repeating a request changes nothing.
+typedef enum
+{
+    IVL_REQUEST_IDLE,
+    IVL_REQUEST_HOVER,
+    IVL_REQUEST_APPROACH,
+    IVL_REQUEST_ABORT,
+    IVL_REQUEST_COUNT
+} ivl_request_t;
+
+/// The learned action.
+typedef struct
+{
+    uint32_t seq;           ///< number given by the sender, echoed in the snapshot
+    float    rrev_c_per_s;  ///< trigger threshold of RREV; 0: the first tick with a valid closing cue triggers
+    float    moment_y_Nm;   ///< magnitude of the nose-up moment, >= 0
+} ivl_policy_t;
+
+/// Request of the operator with its arguments; only those arguments are checked that the request uses.
+typedef struct
+{
+    ivl_request_t request;
+    ivl_vec3_t    p_hover_W_m;  ///< used by HOVER
+    float         speed_mps;    ///< used by APPROACH, latched when the approach starts
+    float         angle_rad;    ///< used by APPROACH: angle above horizontal, 0..pi/2; motion in the x-z plane of W, along +x
+} ivl_command_t;
+
+/// One sensed state of the vehicle.
+typedef struct
+{
+    uint64_t   t_us;       ///< the tick's instant
+    uint64_t   t_pose_us;  ///< sampling instant of position and velocity, <= t_us
+    ivl_vec3_t p_WB_m;
+    ivl_vec3_t v_WB_mps;
+    ivl_quat_t q_WB;
+    ivl_vec3_t w_B_radps;
+    ivl_vec3_t f_B_mps2;  ///< specific force in B: (0, 0, +g) at rest and upright, 0 in free fall
+} ivl_sample_t;
+#endif  // IVL_TYPES_H

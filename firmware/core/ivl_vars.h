@@ -1,0 +1,97 @@
+/// @file ivl_vars.h
+/// The one table of every parameter and every log variable of the core.
+/// A parameter row is X(ctype, group, name, field, unit, min, max, default, doc): `field` is a member of ivl_cfg_t, which is itself made
+/// from this table (ivl_cfg.h).  Numbers are plain decimal constants; users cast them to the type that they need.
+/// group + name stay within 24 characters, name within 20, as the radio link demands.
+/// Sources: [S] published simulation files of the inverted-landing study (2021); [P] its paper; others are choices of this project.
+#ifndef IVL_VARS_H
+#define IVL_VARS_H
+
+// clang-format off
+#define IVL_PARAMS(X)                                                                                                                        \
+    /* vehicle [S] */                                                                                                                        \
+    X(float, "ivl", "mass", mass_kg, "kg", 0.005, 0.5, 0.03584, "mass of body and legs")                                                     \
+    X(float, "ivl", "jxx", jxx_kgm2, "kg m^2", 1.0e-6, 1.0e-2, 49.35e-6, "moment of inertia about b_x")                                      \
+    X(float, "ivl", "jyy", jyy_kgm2, "kg m^2", 1.0e-6, 1.0e-2, 49.35e-6, "moment of inertia about b_y")                                      \
+    X(float, "ivl", "jzz", jzz_kgm2, "kg m^2", 1.0e-6, 1.0e-2, 29.26e-6, "moment of inertia about b_z")                                      \
+    X(float, "ivl", "gravity", gravity_mps2, "m/s^2", 1.0, 20.0, 9.81, "acceleration of gravity")                                            \
+    X(float, "ivl", "arm_x", arm_x_m, "m", 0.005, 0.2, 0.033, "distance of each motor from the b_y axis")                                    \
+    X(float, "ivl", "arm_y", arm_y_m, "m", 0.005, 0.2, 0.033, "distance of each motor from the b_x axis")                                    \
+    X(float, "ivl", "torque_per_thrust", torque_per_thrust_m, "m", 1.0e-4, 0.1, 0.00612, "drag torque of a rotor per thrust")                \
+    X(float, "ivl", "motor_thrust_max", motor_thrust_N_max, "N", 0.01, 5.0, 0.1615, "largest thrust of one motor")                           \
+    X(float, "ivl", "tick_hz", tick_hz, "Hz", 100.0, 2000.0, 500.0, "rate at which ivl_step is called")                                      \
+    /* ceiling and cues */                                                                                                                   \
+    X(float, "ivl", "h_ceil", h_ceil_m, "m", -100.0, 100.0, 2.1, "height in W of the plane that the cues refer to")                          \
+    X(float, "ivl", "d_ceil_min", d_ceil_m_min, "m", 0.001, 1.0, 0.01, "smallest distance that gives a valid cue")                           \
+    X(float, "ivl", "d_ceil_max", d_ceil_m_max, "m", 0.1, 100.0, 5.0, "largest distance that gives a valid cue")                             \
+    X(float, "ivl", "rrev_c_max", rrev_c_per_s_max, "1/s", 0.0, 20.0, 20.0, "largest trigger threshold that a policy may ask for")           \
+    X(float, "ivl", "moment_y_max", moment_y_Nm_max, "N m", 0.0, 0.02, 0.02, "largest moment that a policy may ask for")                     \
+    /* tracking controller [S] */                                                                                                            \
+    X(float, "ivl", "kp_pos_xy", kp_pos_xy_Npm, "N/m", 0.0, 100.0, 0.5, "position gain, horizontal")                                         \
+    X(float, "ivl", "kp_pos_z", kp_pos_z_Npm, "N/m", 0.0, 100.0, 1.2, "position gain, vertical")                                             \
+    X(float, "ivl", "kd_vel_xy", kd_vel_xy_Nspm, "N s/m", 0.0, 100.0, 0.4, "velocity gain, horizontal")                                      \
+    X(float, "ivl", "kd_vel_z", kd_vel_z_Nspm, "N s/m", 0.0, 100.0, 0.35, "velocity gain, vertical")                                         \
+    X(float, "ivl", "kp_att_xy", kp_att_xy_Nmprad, "N m/rad", 0.0, 1.0, 0.004, "attitude gain, roll and pitch")                              \
+    X(float, "ivl", "kp_att_z", kp_att_z_Nmprad, "N m/rad", 0.0, 1.0, 0.003, "attitude gain, yaw")                                           \
+    X(float, "ivl", "kd_rate_xy", kd_rate_xy_Nmsprad, "N m s/rad", 0.0, 1.0, 0.0017, "rate gain, roll and pitch")                            \
+    X(float, "ivl", "kd_rate_z", kd_rate_z_Nmsprad, "N m s/rad", 0.0, 1.0, 0.001, "rate gain, yaw")                                          \
+    X(float, "ivl", "tilt_cmd_max", tilt_cmd_rad_max, "rad", 0.1, 1.2, 0.8, "largest tilt that the controller asks for")                     \
+    X(float, "ivl", "tilt_abort", tilt_abort_rad, "rad", 0.2, 1.5, 1.3, "ready and approach abort beyond this sensed tilt")                  \
+    /* approach [P] */                                                                                                                       \
+    X(float, "ivl", "approach_accel", approach_accel_mps2, "m/s^2", 0.1, 20.0, 4.3, "acceleration along the approach path")                  \
+    X(float, "ivl", "speed_min", speed_mps_min, "m/s", 0.01, 10.0, 0.1, "smallest approach speed that is accepted")                          \
+    X(float, "ivl", "speed_max", speed_mps_max, "m/s", 0.1, 10.0, 6.0, "largest approach speed that is accepted")                            \
+    /* phases */                                                                                                                             \
+    X(float, "ivl", "ready_s_min", ready_s_min, "s", 0.0, 60.0, 0.0, "time in ready before an approach may start")                           \
+    X(float, "ivl", "stale_s_max", stale_s_max, "s", 0.002, 1.0, 0.1, "largest age of a sample that is still flown on")                      \
+    X(float, "ivl", "approach_s_max", approach_s_max, "s", 0.1, 60.0, 10.0, "an approach without trigger aborts after this time")            \
+    X(float, "ivl", "flip_s_max", flip_s_max, "s", 0.01, 5.0, 1.0, "motors are cut this long after the trigger at the latest")               \
+    X(float, "ivl", "coast_s_max", coast_s_max, "s", 0.1, 10.0, 2.5, "coast without contact ends after this time")                           \
+    X(float, "ivl", "attached_s", attached_s, "s", 0.0, 10.0, 1.0, "time in attached before done")                                           \
+    X(uint8_t, "ivl", "cut_at_inverted", cut_at_inverted, "1", 0, 1, 1, "cut motors when b_z passes the horizontal")                         \
+    X(uint8_t, "ivl", "cut_on_contact", cut_on_contact, "1", 0, 1, 1, "cut motors at the first sensed contact")                              \
+    X(float, "ivl", "contact_accel", contact_accel_mps2, "m/s^2", 12.0, 1000.0, 25.0, "specific force that means contact (a flip makes 10)") \
+    X(float, "ivl", "hang_s", hang_s, "s", 0.02, 5.0, 0.2, "specific force reversed for this long means hanging")                            \
+    /* thrust curve [S]: PWM = a tan((f - b) / c) + d, f in gram-force */                                                                    \
+    X(float, "ivl", "pwm_a", pwm_a, "1", 1.0, 1.0e6, 33100.0, "scale of the thrust curve")                                                   \
+    X(float, "ivl", "pwm_b", pwm_b_gf, "gf", -100.0, 100.0, 8.72, "thrust at the middle of the thrust curve")                                \
+    X(float, "ivl", "pwm_c", pwm_c_gf, "gf", 0.1, 1000.0, 11.2, "width of the thrust curve")                                                 \
+    X(float, "ivl", "pwm_d", pwm_d, "1", -1.0e6, 1.0e6, 32600.0, "PWM at the middle of the thrust curve")                                    \
+    X(float, "ivl", "pwm_max", pwm_max, "1", 1.0, 65535.0, 60000.0, "largest PWM value")
+
+/// A log row is X(ctype, group, name, struct, field, unit, doc): `field` is a member path for offsetof(struct, field).
+#define IVL_LOGS(X)                                                                                                      \
+    X(uint8_t, "ivl", "phase", ivl_out_t, phase_log, "1", "phase number, see ivl_phase_t")                               \
+    X(uint8_t, "ivl", "motors_on", ivl_out_t, motors_on, "1", "1 while any motor may run")                               \
+    X(float, "ivl", "thrust1", ivl_out_t, thrust_N[0], "N", "thrust command, front right")                               \
+    X(float, "ivl", "thrust2", ivl_out_t, thrust_N[1], "N", "thrust command, rear right")                                \
+    X(float, "ivl", "thrust3", ivl_out_t, thrust_N[2], "N", "thrust command, rear left")                                 \
+    X(float, "ivl", "thrust4", ivl_out_t, thrust_N[3], "N", "thrust command, front left")                                \
+    X(uint16_t, "ivl", "pwm1", ivl_out_t, pwm[0], "1", "PWM command, front right")                                       \
+    X(uint16_t, "ivl", "pwm2", ivl_out_t, pwm[1], "1", "PWM command, rear right")                                        \
+    X(uint16_t, "ivl", "pwm3", ivl_out_t, pwm[2], "1", "PWM command, rear left")                                         \
+    X(uint16_t, "ivl", "pwm4", ivl_out_t, pwm[3], "1", "PWM command, front left")                                        \
+    X(float, "ivl", "thrust_total", ivl_out_t, thrust_total_N, "N", "sum of the thrust commands")                        \
+    X(float, "ivl", "moment_y", ivl_out_t, moment_y_Nm, "N m", "moment about b_y of the thrust commands")                \
+    X(float, "ivl", "d_ceil", ivl_out_t, ceiling.d_ceil_m, "m", "distance to the ceiling, 0 if invalid")                 \
+    X(float, "ivl", "d_age", ivl_out_t, ceiling.age_s, "s", "age of the distance")                                       \
+    X(float, "ivl", "rrev", ivl_out_t, cues.rrev_per_s, "1/s", "RREV, 0 if invalid")                                     \
+    X(float, "ivl", "of_y", ivl_out_t, cues.of_y_radps, "rad/s", "ventral flow about body y, 0 if invalid")              \
+    X(float, "ivl", "age", ivl_state_t, sense.age_s, "s", "age of the sample in use")                                    \
+    X(uint32_t, "ivl", "policy_seq", ivl_state_t, policy.seq, "1", "number of the policy in use")                        \
+    X(float, "ivl", "rrev_c", ivl_state_t, policy.rrev_c_per_s, "1/s", "trigger threshold in use")                       \
+    X(float, "ivl", "moment_c", ivl_state_t, policy.moment_y_Nm, "N m", "moment in use")                                 \
+    X(float, "ivl", "trg_d", ivl_state_t, snapshot.d_ceil_m, "m", "distance at the trigger")                             \
+    X(float, "ivl", "trg_rrev", ivl_state_t, snapshot.rrev_per_s, "1/s", "RREV at the trigger")                          \
+    X(float, "ivl", "trg_of_y", ivl_state_t, snapshot.of_y_radps, "rad/s", "ventral flow at the trigger")                \
+    X(float, "ivl", "trg_vx", ivl_state_t, snapshot.v_WB_mps.x, "m/s", "velocity along W x at the trigger")              \
+    X(float, "ivl", "trg_vz", ivl_state_t, snapshot.v_WB_mps.z, "m/s", "velocity along W z at the trigger")              \
+    X(uint32_t, "ivl", "trg_seq", ivl_state_t, snapshot.policy.seq, "1", "number of the policy that triggered")          \
+    X(uint32_t, "ivl", "n_tick", ivl_state_t, diag.n_tick, "1", "ticks since ivl_init")                                  \
+    X(uint32_t, "ivl", "n_bad_pose", ivl_state_t, diag.n_bad_pose, "1", "ticks with an unusable sensed state")           \
+    X(uint32_t, "ivl", "n_bad_cmd", ivl_state_t, diag.n_bad_command, "1", "ticks with an unusable command")              \
+    X(uint32_t, "ivl", "n_refused", ivl_state_t, diag.n_policy_refused, "1", "policies refused")                         \
+    X(uint32_t, "ivl", "n_abort", ivl_state_t, diag.n_abort, "1", "entries into aborted")                                \
+    X(uint32_t, "ivl", "n_trigger", ivl_state_t, diag.n_trigger, "1", "triggers fired")
+// clang-format on
+#endif  // IVL_VARS_H
