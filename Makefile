@@ -1,0 +1,156 @@
+# The front door.  `make` lists the targets.
+#
+# This file decides what is set up and in which order; tools/native.mk compiles the C code.
+# Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS.
+
+PYTHON     ?= python3
+CLANG      ?= clang-14
+FLAVOUR    ?= release
+JOBS       ?= $(shell getconf _NPROCESSORS_ONLN)
+EXPERIMENT ?= experiments/paper_vertical.yaml
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+export CC CLANG
+
+VENV   := .venv
+BIN    := $(VENV)/bin
+UNITY  := build/unity
+GOLDEN := O0 release clang-O0 clang
+# a -j given by the user is passed on; without one the C code is compiled on all cores
+NATIVE  = $(MAKE) --no-print-directory -f tools/native.mk $(if $(findstring j,$(firstword -$(MAKEFLAGS))),,-j$(JOBS) -Otarget)
+say     = @printf '==> %s\n'
+pip     = $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint tools/constraints.txt
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+
+##@ Start here
+
+.PHONY: help
+help: ## list the targets
+	@awk -f tools/help.awk $(firstword $(MAKEFILE_LIST))
+
+.PHONY: setup
+setup: $(VENV)/.stamp-run ## create .venv with the package `ivl` and what it needs to run
+
+.PHONY: build
+build: ## compile firmware core and simulator into the library that Python loads
+	$(say) 'build: compiling firmware core and simulator ($(FLAVOUR))'
+	@$(NATIVE) FLAVOUR=$(FLAVOUR) lib
+
+.PHONY: learn
+learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for another)
+	$(say) 'learn: $(EXPERIMENT)'
+	@$(BIN)/ivl learn $(EXPERIMENT)
+
+##@ Tests
+
+.PHONY: test
+test: lint test-c san golden test-py test-mujoco ## everything below, set-up and compilers included
+	$(say) 'test: everything passed'
+
+.PHONY: test-c
+test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator (Unity)
+	$(say) 'test-c: C tests, strict warnings as errors'
+	@$(NATIVE) FLAVOUR=release check
+
+.PHONY: san
+san: toolchain $(UNITY)/unity.c ## the same C tests under AddressSanitizer and UndefinedBehaviorSanitizer
+	$(say) 'san: C tests under ASan and UBSan'
+	@$(NATIVE) FLAVOUR=san check
+
+.PHONY: golden
+golden: $(GOLDEN:%=golden-build-%) ## same bits from gcc and clang, -O0 and -O3, one thread or many
+	$(say) 'golden: hashes of reference landings'
+	@$(PYTHON) tools/golden.py $(GOLDEN:%=build/%/sim_golden)
+
+.PHONY: golden-update
+golden-update: $(GOLDEN:%=golden-build-%) ## accept the present hash as the reference (in its own commit, with the reason)
+	$(say) 'golden-update: tests/c/golden.txt'
+	@$(PYTHON) tools/golden.py --update $(GOLDEN:%=build/%/sim_golden)
+
+.PHONY: $(GOLDEN:%=golden-build-%)
+$(GOLDEN:%=golden-build-%): golden-build-%: toolchain
+	$(say) 'golden: compiling $*'
+	@$(NATIVE) FLAVOUR=$* golden
+
+.PHONY: test-py
+test-py: setup-dev build ## tests of the Python package
+	$(say) 'test-py: pytest tests/py'
+	@$(BIN)/python -m pytest tests/py $(PYTEST_ARGS)
+
+.PHONY: test-mujoco
+test-mujoco: setup-dev build ## landings compared with an independent engine
+	$(say) 'test-mujoco: pytest tests/mujoco'
+	@$(BIN)/python -m pytest tests/mujoco $(PYTEST_ARGS)
+
+.PHONY: lint
+lint: setup-dev toolchain ## formatting, types, rules of the firmware core, equation references
+	$(say) 'lint: ruff'
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	$(say) 'lint: mypy --strict'
+	@$(BIN)/mypy --strict host/ivl
+	$(say) 'lint: clang-format'
+	@$(BIN)/clang-format --dry-run -Werror $(C_FILES) < /dev/null
+	$(say) 'lint: rules of the firmware core'
+	@$(NATIVE) FLAVOUR=O0 core
+	@$(NATIVE) FLAVOUR=release core
+	@tools/check_core.sh build/O0/firmware/core build/release/firmware/core
+	$(say) 'lint: equation references'
+	@$(BIN)/python tools/check_refs.py
+
+##@ Work
+
+.PHONY: format
+format: setup-dev ## format C and Python in place
+	$(say) 'format: ruff, clang-format'
+	@$(BIN)/ruff check --fix-only --quiet
+	@$(BIN)/ruff format
+	@$(BIN)/clang-format -i $(C_FILES) < /dev/null
+
+.PHONY: bench
+bench: setup-dev build ## rollouts and steps per second per core, and the ratio to MuJoCo
+	$(say) 'bench'
+	@$(BIN)/ivl bench
+
+.PHONY: setup-dev
+setup-dev: $(VENV)/.stamp-dev ## add what tests and lint need to .venv
+
+.PHONY: toolchain
+toolchain: ## install the compilers that the tests need (Debian; needs root only if one is missing)
+	@tools/apt_install.sh $(CC):gcc nm:binutils $(CLANG):clang-14
+
+.PHONY: clean
+clean: ## remove what was compiled
+	$(say) 'clean: build/, native library, caches'
+	@rm -rf build host/ivl/_native/*.so .mypy_cache .pytest_cache .ruff_cache .hypothesis
+
+.PHONY: distclean
+distclean: clean ## remove .venv as well
+	$(say) 'distclean: $(VENV)'
+	@rm -rf $(VENV) host/*.egg-info
+
+C_FILES = $(wildcard firmware/core/*.[ch] sim_sil/*.[ch] tests/c/*.[ch])
+
+# set-up, each step once
+
+$(BIN)/python:
+	$(say) 'setup: creating $(VENV)'
+	@PYTHON='$(PYTHON)' tools/make_venv.sh $(VENV)
+
+$(VENV)/.stamp-run: $(BIN)/python pyproject.toml tools/constraints.txt
+	$(say) 'setup: installing ivl and what it needs'
+	@$(pip) --editable .
+	@touch $@
+
+$(VENV)/.stamp-dev: $(VENV)/.stamp-run
+	$(say) 'setup: installing what tests and lint need'
+	@$(pip) --editable '.[test,mujoco,lint]'
+	@touch $@
+
+$(UNITY)/unity.c: tools/get_unity.sh tools/unity.txt | $(BIN)/python
+	$(say) 'setup: installing Unity, the C test framework'
+	@tools/get_unity.sh $(BIN)/python $(UNITY)

@@ -1,0 +1,114 @@
+# Compiles firmware core, simulator and C tests.  Called by the Makefile as
+#     make -f tools/native.mk FLAVOUR=<flavour> <target>
+# Targets: core, lib, check, golden.  Everything made is in build/<flavour>/.
+# Each source is compiled once per flavour; the library and the tests link the same objects.
+
+FLAVOUR ?= release
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+CLANG ?= clang-14
+
+SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
+
+FLAVOURS           := release O0 san clang clang-O0
+OPTIMISE_release   := -O3
+OPTIMISE_O0        := -O0
+OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
+OPTIMISE_clang     := -O3
+OPTIMISE_clang-O0  := -O0
+ifeq ($(filter $(FLAVOUR),$(FLAVOURS)),)
+$(error FLAVOUR=$(FLAVOUR) is not one of: $(FLAVOURS))
+endif
+COMPILER := $(if $(filter clang%,$(FLAVOUR)),$(CLANG),$(CC))
+
+WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
+            -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
+
+# no contraction and no -march: the same source gives the same bits on every machine and compiler
+CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPIC -pthread $(WARNINGS) \
+          -Ifirmware/core -Isim_sil
+LDLIBS := -lm -pthread
+
+# Flags of a single object are given by its name without folder and suffix:
+#     FLAGS_sim_dynamics := -mavx2 -mno-fma
+# A source that is compiled again under other flags is listed as <stem>@<variant>:
+#     VARIANTS := sim_dynamics@avx2
+#     FLAGS_sim_dynamics@avx2 := -mavx2 -mno-fma -DSIM_VARIANT=avx2
+VARIANTS :=
+
+BUILD   := build/$(FLAVOUR)
+CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
+SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
+SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_% tests/c/sim_golden.c,$(wildcard tests/c/*.c)))
+TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
+UNITY   := build/unity
+LIBRARY := host/ivl/_native/libivl_sil.so
+
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: core lib check golden FORCE
+
+core: $(CORE)
+
+# only the release flavour is installed where Python looks for it
+lib: $(if $(filter release,$(FLAVOUR)),$(LIBRARY),$(BUILD)/libivl_sil.so)
+
+check: $(TESTS:%=run-%)
+	@test -n '$(TESTS)' || { echo 'error: no tests/c/test_*.c found' >&2; exit 1; }
+	@echo '$(words $(TESTS)) C test programs passed ($(FLAVOUR))'
+
+golden: $(BUILD)/sim_golden
+
+# renamed into place, so that a running process keeps the library that it has mapped
+$(LIBRARY): $(BUILD)/libivl_sil.so
+	@mkdir -p $(@D)
+	@cp $< $@.new && mv -f $@.new $@
+
+$(BUILD)/libivl_sil.so: $(CORE) $(SIM) $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -shared -o $@ $(filter %.o,$^) $(LDLIBS)
+
+$(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+
+$(BUILD)/sim_golden: $(BUILD)/tests/c/sim_golden.o $(CORE) $(SIM) $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+
+run-test_%: $(BUILD)/test_% FORCE
+	@tools/run_unity.sh $<
+
+# Unity is a foreign source: a system header to the tests, compiled without our warnings
+UNITY_FLAGS := -DUNITY_INCLUDE_DOUBLE -isystem $(UNITY)
+$(BUILD)/unity.o: $(UNITY)/unity.c $(BUILD)/flags.txt
+	@echo '  CC    $@'
+	@$(COMPILER) $(filter-out $(WARNINGS),$(CFLAGS)) $(UNITY_FLAGS) -c -o $@ $<
+
+$(BUILD)/tests/c/%.o: CFLAGS += $(UNITY_FLAGS) -Itests/c
+
+define compile
+@echo '  CC    $@'
+@mkdir -p $(@D)
+@$(COMPILER) $(CFLAGS) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+endef
+
+$(BUILD)/%.o: %.c $(BUILD)/flags.txt
+	$(compile)
+
+$(foreach v,$(VARIANTS),$(eval $(BUILD)/sim_sil/$v.o: sim_sil/$(firstword $(subst @, ,$v)).c $(BUILD)/flags.txt ; $$(compile)))
+
+# rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
+define remember
+@mkdir -p $(@D)
+@printf '%s\n' '$1' | cmp -s - $@ || printf '%s\n' '$1' > $@
+endef
+
+$(BUILD)/flags.txt: FORCE
+	$(call remember,$(COMPILER) $(CFLAGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v)))
+
+$(BUILD)/objects.txt: FORCE
+	$(call remember,$(CORE) $(SIM) $(SUPPORT))
+
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o) $(BUILD)/tests/c/sim_golden.o)
