@@ -1,7 +1,7 @@
 """Compare the bits of reference landings across compilers, optimisation levels and thread counts.
 
-Each program given prints one line, a hash over everything that its rollouts computed; its only argument is the number of
-threads.  All lines must be equal, and equal to the reference in tests/c/golden.txt, which changes only with the physics.
+Each program given prints one line, a hash over everything that its rollouts computed; its only argument is the number
+of threads.  All lines must be equal, and equal to the reference in tests/c/golden.txt, which changes with the physics.
 
 usage: golden.py [--update] PROGRAM...
 """
@@ -20,8 +20,8 @@ def hash_line(program: Path, threads: int) -> str:
     run = subprocess.run([program.resolve(), str(threads)], capture_output=True, text=True, check=False)
     lines = run.stdout.split("\n")
     if run.returncode != 0 or len(lines) != 2 or not lines[0] or lines[1]:
-        message = f"{program} {threads}: exit code {run.returncode}, expected one line, got {run.stdout!r}\n{run.stderr}"
-        raise RuntimeError(message)
+        found = f"exit code {run.returncode}, output {run.stdout!r}, errors {run.stderr!r}"
+        raise RuntimeError(f"{program} {threads}: expected one line and exit code 0, found {found}")
     return lines[0]
 
 
@@ -49,7 +49,7 @@ def main() -> int:
         return 1
     expected = REFERENCE.read_text(encoding="ascii").strip()
     if found != expected:
-        print(f"error: the landings changed: reference {expected}; if that is meant: make golden-update", file=sys.stderr)
+        print(f"error: the landings changed from {expected}; if that is meant: make golden-update", file=sys.stderr)
         return 1
     return 0
 
