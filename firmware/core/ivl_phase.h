@@ -8,16 +8,15 @@
 typedef enum
 {
     IVL_DRIVE_OFF,
-    IVL_DRIVE_HOVER,     ///< track the commanded hover point
+    IVL_DRIVE_HOVER,     ///< track state->p_hold_W_m
     IVL_DRIVE_APPROACH,  ///< track the approach path
-    IVL_DRIVE_FLIP,      ///< front pair makes the policy's moment
-    IVL_DRIVE_ABORT      ///< track the abort point; off once the sensed state was lost
+    IVL_DRIVE_FLIP       ///< front pair makes the policy's moment
 } ivl_drive_t;
 
 /// Follow the exits of the table until the phase is stable (each phase at most once per tick), with the entry action of each phase.
 void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues);
 
-/// What drives the motors in the present phase.
+/// What drives the motors in the present phase: the row's entry, but OFF in ABORTED once the sensed state was lost.
 ivl_drive_t ivl_phase_drive(const ivl_state_t *state);
 
 /// Lower-case name of a phase ("approach"), "?" for a number that is none.  Static storage.

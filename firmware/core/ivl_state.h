@@ -37,7 +37,7 @@ typedef struct
     ivl_sense_t    sense;
     ivl_policy_t   policy;
     ivl_approach_t approach;
-    ivl_vec3_t     p_abort_W_m;  ///< where ABORTED hovers
+    ivl_vec3_t     p_hold_W_m;  ///< where READY and ABORTED hover
     ivl_contact_t  contact;
     ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
     ivl_diag_t     diag;

@@ -1,0 +1,17 @@
+/// @file ivl_ceiling.c
+#include "ivl_ceiling.h"
+
+ivl_ceiling_t ivl_ceiling_compute(const ivl_cfg_t *cfg, const ivl_sense_t *sense)
+{
+    const float d_ceil_m = cfg->h_ceil_m - sense->sample.p_WB_m.z;
+    if (sense->fresh && (d_ceil_m >= cfg->d_ceil_m_min) && (d_ceil_m <= cfg->d_ceil_m_max))
+    {
+        return (ivl_ceiling_t){
+            .d_ceil_m = d_ceil_m,
+            .v_close_mps = sense->sample.v_WB_mps.z,
+            .age_s = sense->age_s,
+            .valid = true,
+        };
+    }
+    return (ivl_ceiling_t){.age_s = sense->age_s};
+}

@@ -1,0 +1,281 @@
+/// @file ivl_phase.c
+/// The phase table and its conditions.  Read the table first.
+#include "ivl_phase.h"
+
+#include <string.h>
+
+// ---- conditions: pure questions about the state of this tick
+
+typedef bool (*condition_t)(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_cues_t cues);
+
+#define CONDITION(name) static bool name(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_cues_t cues)
+#define UNUSED(x) ((void)(x))
+
+static bool requested(const ivl_state_t *state, ivl_request_t request)
+{
+    return state->sense.cmd.request == request;
+}
+
+static bool elapsed(const ivl_state_t *state, float limit_s)
+{
+    return (float)state->n_phase_tick * state->derived.dt_s >= limit_s;
+}
+
+// a good, recent sample of a vehicle that is not tipped over
+static bool flyable(const ivl_state_t *state)
+{
+    return state->sense.usable && (state->sense.up_z >= state->derived.cos_tilt_abort);
+}
+
+static bool trigger_fires(const ivl_state_t *state, ivl_cues_t cues);
+
+CONDITION(request_idle)
+{
+    UNUSED(cfg), UNUSED(cues);
+    return requested(state, IVL_REQUEST_IDLE);
+}
+
+CONDITION(request_abort)
+{
+    UNUSED(cfg), UNUSED(cues);
+    return requested(state, IVL_REQUEST_ABORT);
+}
+
+CONDITION(request_hover)
+{
+    UNUSED(cfg), UNUSED(cues);
+    return requested(state, IVL_REQUEST_HOVER);
+}
+
+// after a landing only HOVER starts the next cycle: a forgotten APPROACH must not
+CONDITION(may_arm)
+{
+    UNUSED(cfg), UNUSED(cues);
+    const bool wanted = requested(state, IVL_REQUEST_HOVER) || (requested(state, IVL_REQUEST_APPROACH) && !state->triggered);
+    return wanted && state->derived.cfg_good && state->sense.fresh && flyable(state);
+}
+
+CONDITION(may_approach)
+{
+    UNUSED(cues);
+    return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && state->sense.fresh && elapsed(state, cfg->ready_s_min);
+}
+
+CONDITION(unflyable)
+{
+    UNUSED(cfg), UNUSED(cues);
+    return !flyable(state);
+}
+
+CONDITION(triggered)
+{
+    UNUSED(cfg);
+    return trigger_fires(state, cues);
+}
+
+CONDITION(approach_too_long)
+{
+    UNUSED(cues);
+    return elapsed(state, cfg->approach_s_max);
+}
+
+CONDITION(contact)
+{
+    UNUSED(cues);
+    return (cfg->cut_on_contact != 0u) && state->contact.contact;
+}
+
+CONDITION(hanging)
+{
+    UNUSED(cfg), UNUSED(cues);
+    return state->contact.hanging;
+}
+
+CONDITION(sense_lost)
+{
+    UNUSED(cfg), UNUSED(cues);
+    return !state->sense.usable;
+}
+
+CONDITION(inverted)
+{
+    UNUSED(cues);
+    return (cfg->cut_at_inverted != 0u) && !(state->sense.up_z > 0.0f);
+}
+
+CONDITION(flip_too_long)
+{
+    UNUSED(cues);
+    return elapsed(state, cfg->flip_s_max);
+}
+
+CONDITION(coast_over)
+{
+    UNUSED(cues);
+    return elapsed(state, cfg->coast_s_max);
+}
+
+CONDITION(attached_over)
+{
+    UNUSED(cues);
+    return elapsed(state, cfg->attached_s);
+}
+
+// ---- the table
+
+#define EXITS_MAX 6
+
+typedef struct
+{
+    condition_t when;  // NULL ends the list
+    ivl_phase_t next;
+} exit_t;
+
+typedef struct
+{
+    const char *name;
+    ivl_drive_t drive;
+    bool        trigger_live;
+    exit_t      exits[EXITS_MAX + 1];  // the first one whose condition holds is taken
+} row_t;
+
+static const row_t ROWS[] = {
+    [IVL_PHASE_IDLE] = {"idle", IVL_DRIVE_OFF, false, {{may_arm, IVL_PHASE_READY}}},
+    [IVL_PHASE_READY] = {"ready",
+                         IVL_DRIVE_HOVER,
+                         false,
+                         {{request_idle, IVL_PHASE_IDLE},
+                          {request_abort, IVL_PHASE_ABORTED},
+                          {unflyable, IVL_PHASE_ABORTED},
+                          {may_approach, IVL_PHASE_APPROACH}}},
+    [IVL_PHASE_APPROACH] = {"approach",
+                            IVL_DRIVE_APPROACH,
+                            true,
+                            {{request_idle, IVL_PHASE_IDLE},
+                             {request_abort, IVL_PHASE_ABORTED},
+                             {unflyable, IVL_PHASE_ABORTED},
+                             {request_hover, IVL_PHASE_READY},
+                             {triggered, IVL_PHASE_FLIP},
+                             {approach_too_long, IVL_PHASE_ABORTED}}},
+    [IVL_PHASE_FLIP] = {"flip",
+                        IVL_DRIVE_FLIP,
+                        false,
+                        {{request_idle, IVL_PHASE_IDLE},
+                         {contact, IVL_PHASE_ATTACHED},
+                         {request_abort, IVL_PHASE_COAST},
+                         {sense_lost, IVL_PHASE_COAST},
+                         {inverted, IVL_PHASE_COAST},
+                         {flip_too_long, IVL_PHASE_COAST}}},
+    [IVL_PHASE_COAST] = {"coast",
+                         IVL_DRIVE_OFF,
+                         false,
+                         {{request_idle, IVL_PHASE_IDLE},
+                          {contact, IVL_PHASE_ATTACHED},
+                          {hanging, IVL_PHASE_ATTACHED},
+                          {coast_over, IVL_PHASE_DONE}}},
+    [IVL_PHASE_ATTACHED] = {"attached", IVL_DRIVE_OFF, false, {{request_idle, IVL_PHASE_IDLE}, {attached_over, IVL_PHASE_DONE}}},
+    [IVL_PHASE_DONE] = {"done", IVL_DRIVE_OFF, false, {{request_idle, IVL_PHASE_IDLE}}},
+    [IVL_PHASE_ABORTED] = {"aborted", IVL_DRIVE_HOVER, false, {{request_idle, IVL_PHASE_IDLE}}},
+};
+
+// a row for every phase, and the numbers that logs and traces rely on
+_Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_PHASE_COUNT, "one row a phase");
+_Static_assert(IVL_PHASE_IDLE == 0 && IVL_PHASE_READY == 1 && IVL_PHASE_APPROACH == 2 && IVL_PHASE_FLIP == 3, "phase numbers");
+_Static_assert(IVL_PHASE_COAST == 4 && IVL_PHASE_ATTACHED == 5 && IVL_PHASE_DONE == 6 && IVL_PHASE_ABORTED == 7, "phase numbers");
+
+static bool trigger_fires(const ivl_state_t *state, ivl_cues_t cues)
+{
+    return ROWS[state->phase].trigger_live && state->has_policy && !state->triggered && ivl_trigger_due(&state->policy, cues);
+}
+
+// ---- what happens on the way into a phase
+
+static void enter_ready(ivl_state_t *state)
+{
+    state->triggered = false;
+    memset(&state->snapshot, 0, sizeof state->snapshot);
+    memset(&state->contact, 0, sizeof state->contact);
+}
+
+static void enter(ivl_state_t *state, ivl_phase_t next, ivl_ceiling_t ceiling, ivl_cues_t cues)
+{
+    const ivl_sample_t *sample = &state->sense.sample;
+    state->phase = next;
+    state->n_phase_tick = 0;
+    switch (next)
+    {
+        case IVL_PHASE_READY:
+            enter_ready(state);
+            state->p_hold_W_m = sample->p_WB_m;
+            break;
+        case IVL_PHASE_APPROACH:
+            ivl_approach_begin(&state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps,
+                               state->sense.cmd.angle_rad);
+            break;
+        case IVL_PHASE_FLIP:
+            state->triggered = true;
+            state->diag.n_trigger++;
+            ivl_trigger_latch(&state->snapshot, sample, ceiling, cues, &state->policy);
+            break;
+        case IVL_PHASE_ABORTED:
+            state->p_hold_W_m = sample->p_WB_m;
+            state->abort_cut = false;
+            state->diag.n_abort++;
+            break;
+        case IVL_PHASE_IDLE:
+        case IVL_PHASE_COAST:
+        case IVL_PHASE_ATTACHED:
+        case IVL_PHASE_DONE:
+        case IVL_PHASE_COUNT:
+        default:
+            break;
+    }
+}
+
+static bool take_exit(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues)
+{
+    for (const exit_t *e = ROWS[state->phase].exits; e->when != NULL; e++)
+    {
+        if (e->when(cfg, state, cues))
+        {
+            enter(state, e->next, ceiling, cues);
+            return true;
+        }
+    }
+    return false;
+}
+
+void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues)
+{
+    // the bound is never reached: no set of conditions leads round a circle within one tick
+    for (int i = 0; (i < (int)IVL_PHASE_COUNT) && take_exit(cfg, state, ceiling, cues); i++)
+    {
+    }
+    state->n_phase_tick++;
+    // only a HOVER request carries a checked hover point; until one comes, READY stays where it began
+    if ((state->phase == IVL_PHASE_READY) && requested(state, IVL_REQUEST_HOVER))
+    {
+        state->p_hold_W_m = state->sense.cmd.p_hover_W_m;
+    }
+    // a vehicle that was lost once may lie anywhere when it is seen again: its motors stay off
+    if ((state->phase == IVL_PHASE_ABORTED) && !flyable(state))
+    {
+        state->abort_cut = true;
+    }
+}
+
+ivl_drive_t ivl_phase_drive(const ivl_state_t *state)
+{
+    const bool cut = (state->phase == IVL_PHASE_ABORTED) && state->abort_cut;
+    return cut ? IVL_DRIVE_OFF : ROWS[state->phase].drive;
+}
+
+const char *ivl_phase_name(ivl_phase_t phase)
+{
+    return ((unsigned)phase < (unsigned)IVL_PHASE_COUNT) ? ROWS[phase].name : "?";
+}
+
+bool ivl_motors_latched_off(const ivl_state_t *state)
+{
+    return (state->phase != IVL_PHASE_IDLE) && (ivl_phase_drive(state) == IVL_DRIVE_OFF);
+}

@@ -1,0 +1,100 @@
+/// @file ivl_step.c
+/// The pipeline on one page.
+#include <string.h>
+
+#include "ivl.h"
+#include "ivl_maneuver.h"
+
+void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state)
+{
+    memset(state, 0, sizeof *state);
+    ivl_sense_reset(&state->sense);
+    state->phase = IVL_PHASE_IDLE;
+    if (ivl_cfg_check(cfg) == IVL_OK)
+    {
+        state->derived = (ivl_derived_t){
+            .dt_s = 1.0f / cfg->tick_hz,
+            .tan_tilt_cmd_max = ivl_tan(cfg->tilt_cmd_rad_max),
+            .cos_tilt_abort = ivl_sincos(cfg->tilt_abort_rad).cos,
+            .cfg_good = true,
+        };
+    }
+}
+
+static void count_faults(ivl_diag_t *diag, ivl_sense_fault_t fault)
+{
+    diag->n_bad_pose += fault.bad_pose ? 1u : 0u;
+    diag->n_bad_command += fault.bad_command ? 1u : 0u;
+}
+
+// all motors off
+static void rest(const ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues, ivl_out_t *out)
+{
+    *out = (ivl_out_t){.phase = state->phase, .phase_log = (uint8_t)state->phase, .ceiling = ceiling, .cues = cues};
+}
+
+static void track(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_reference_t *ref, float thrust_N[4])
+{
+    const ivl_wrench_t wrench = ivl_controller_compute(cfg, &state->sense.sample, ref, state->derived.tan_tilt_cmd_max);
+    ivl_mixer_thrusts(cfg, &wrench, thrust_N);
+}
+
+static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, float thrust_N[4])
+{
+    ivl_reference_t ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
+    switch (what)
+    {
+        case IVL_DRIVE_HOVER:
+            ref.p_W_m = state->p_hold_W_m;
+            track(cfg, state, &ref, thrust_N);
+            break;
+        case IVL_DRIVE_APPROACH:
+            ref = ivl_approach_next(cfg, &state->approach, state->derived.dt_s);
+            track(cfg, state, &ref, thrust_N);
+            break;
+        case IVL_DRIVE_FLIP:
+            ivl_maneuver_thrusts(cfg, state->snapshot.policy.moment_y_Nm, thrust_N);
+            break;
+        case IVL_DRIVE_OFF:
+        default:
+            memset(thrust_N, 0, 4u * sizeof thrust_N[0]);
+            break;
+    }
+}
+
+void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
+{
+    state->diag.n_tick++;
+    ivl_ceiling_t ceiling = {0};
+    ivl_cues_t    cues = {0};
+
+    // a finished landing only waits for the end of its request cycle
+    if ((state->phase == IVL_PHASE_DONE) && (in->cmd.request != IVL_REQUEST_IDLE))
+    {
+        rest(state, ceiling, cues, out);
+        return;
+    }
+
+    // sensed state -> contact, ceiling -> cues -> phase (the trigger is one of its conditions)
+    count_faults(&state->diag, ivl_sense_update(cfg, &state->sense, in, state->derived.dt_s));
+    ivl_contact_update(cfg, &state->contact, &state->sense, state->derived.dt_s);
+    if (!ivl_motors_latched_off(state))
+    {
+        ceiling = ivl_ceiling_compute(cfg, &state->sense);
+        cues = ivl_cues_compute(ceiling, state->sense.sample.v_WB_mps);
+    }
+    ivl_phase_update(cfg, state, ceiling, cues);
+
+    // phase -> thrusts -> PWM
+    rest(state, ceiling, cues, out);
+    const ivl_drive_t what = ivl_phase_drive(state);
+    if (what != IVL_DRIVE_OFF)
+    {
+        out->motors_on = true;
+        drive(cfg, state, what, out->thrust_N);
+        ivl_pwm_of_thrust(cfg, out->thrust_N, out->pwm);
+        const ivl_wrench_t made = ivl_mixer_wrench(cfg, out->thrust_N);
+        out->moment_y_Nm = made.moment_B_Nm.y;
+        out->thrust_total_N = made.thrust_N;
+    }
+}
