@@ -26,23 +26,27 @@ WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-prom
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
 
 # no contraction and no -march: the same source gives the same bits on every machine and compiler
-CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPIC -pthread $(WARNINGS) \
+CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPIC -pthread \
           -Ifirmware/core -Isim_sil
 LDLIBS := -lm -pthread
 
-# Flags of a single object are given by its name without folder and suffix:
+# Further flags of a folder and of a single object, the latter by its name without folder and suffix:
 #     FLAGS_sim_dynamics := -mavx2 -mno-fma
 # A source that is compiled again under other flags is listed as <stem>@<variant>:
 #     VARIANTS := sim_dynamics@avx2
 #     FLAGS_sim_dynamics@avx2 := -mavx2 -mno-fma -DSIM_VARIANT=avx2
 VARIANTS :=
 
+# Unity is a foreign source: a system header to the tests, compiled without our warnings
+UNITY         := build/unity
+FLAGS_unity   := -DUNITY_INCLUDE_DOUBLE -isystem $(UNITY)
+FLAGS_tests/c := $(FLAGS_unity) -Itests/c
+
 BUILD   := build/$(FLAVOUR)
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
 SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_% tests/c/sim_golden.c,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
-UNITY   := build/unity
 LIBRARY := host/ivl/_native/libivl_sil.so
 
 .DELETE_ON_ERROR:
@@ -80,35 +84,34 @@ $(BUILD)/sim_golden: $(BUILD)/tests/c/sim_golden.o $(CORE) $(SIM) $(BUILD)/objec
 run-test_%: $(BUILD)/test_% FORCE
 	@tools/run_unity.sh $<
 
-# Unity is a foreign source: a system header to the tests, compiled without our warnings
-UNITY_FLAGS := -DUNITY_INCLUDE_DOUBLE -isystem $(UNITY)
-$(BUILD)/unity.o: $(UNITY)/unity.c $(BUILD)/flags.txt
-	@echo '  CC    $@'
-	@$(COMPILER) $(filter-out $(WARNINGS),$(CFLAGS)) $(UNITY_FLAGS) -c -o $@ $<
-
-$(BUILD)/tests/c/%.o: CFLAGS += $(UNITY_FLAGS) -Itests/c
-
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(WARNINGS) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
 endef
 
 $(BUILD)/%.o: %.c $(BUILD)/flags.txt
 	$(compile)
 
+$(BUILD)/unity.o: WARNINGS :=
+$(BUILD)/unity.o: $(UNITY)/unity.c tools/native.mk
+	$(compile)
+
 $(foreach v,$(VARIANTS),$(eval $(BUILD)/sim_sil/$v.o: sim_sil/$(firstword $(subst @, ,$v)).c $(BUILD)/flags.txt ; $$(compile)))
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
+ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
+ALL_OBJECTS := $(CORE) $(SIM) $(SUPPORT)
+
 define remember
 @mkdir -p $(@D)
 @printf '%s\n' '$1' | cmp -s - $@ || printf '%s\n' '$1' > $@
 endef
 
 $(BUILD)/flags.txt: FORCE
-	$(call remember,$(COMPILER) $(CFLAGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v)))
+	$(call remember,$(ALL_FLAGS))
 
 $(BUILD)/objects.txt: FORCE
-	$(call remember,$(CORE) $(SIM) $(SUPPORT))
+	$(call remember,$(ALL_OBJECTS))
 
 -include $(patsubst %.o,%.d,$(CORE) $(SIM) $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o) $(BUILD)/tests/c/sim_golden.o)
