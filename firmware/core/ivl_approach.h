@@ -14,8 +14,8 @@ typedef struct
 
 typedef struct
 {
-    ivl_vec3_t p_W_m;       ///< present point of the path
-    float      dir_x;       ///< direction of the path in W, unit length
+    ivl_vec3_t p_W_m;  ///< present point of the path
+    float      dir_x;  ///< direction of the path in W, unit length
     float      dir_z;
     float      speed_mps;   ///< present speed along the path
     float      target_mps;  ///< speed to be held

@@ -7,14 +7,14 @@
 
 void ivl_cfg_defaults(ivl_cfg_t *cfg)
 {
-    IVL_PARAMS(SET_DEFAULT)
+    IVL_PARAMS(SET_DEFAULT);
 }
 
 // one comparison per row of the table, in positive form so that NaN is refused
-#define REFUSE_OUTSIDE(ctype, group, name, field, unit, min, max, dflt, doc)                       \
-    if (!(((float)cfg->field >= (float)(min)) && ((float)cfg->field <= (float)(max))))             \
-    {                                                                                              \
-        return name;                                                                               \
+#define REFUSE_OUTSIDE(ctype, group, name, field, unit, min, max, dflt, doc)                                                               \
+    if (!(((float)cfg->field >= (float)(min)) && ((float)cfg->field <= (float)(max))))                                                     \
+    {                                                                                                                                      \
+        return name;                                                                                                                       \
     }
 
 static const char *bad_range(const ivl_cfg_t *cfg)

@@ -3,7 +3,6 @@
 /// Only + - * /, sqrtf, fabsf and comparisons: the bits are the same on every IEEE-754 machine when contraction is off.  Pure, O(1).
 #ifndef IVL_MATH_H
 #define IVL_MATH_H
-#include <float.h>
 #include <math.h>
 
 #include "ivl_types.h"

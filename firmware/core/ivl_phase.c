@@ -9,7 +9,7 @@
 typedef bool (*condition_t)(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_cues_t cues);
 
 #define CONDITION(name) static bool name(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_cues_t cues)
-#define UNUSED(x) ((void)(x))
+#define UNUSED(x)       ((void)(x))
 
 static bool requested(const ivl_state_t *state, ivl_request_t request)
 {
@@ -139,44 +139,43 @@ typedef struct
     exit_t      exits[EXITS_MAX + 1];  // the first one whose condition holds is taken
 } row_t;
 
+// clang-format off
 static const row_t ROWS[] = {
-    [IVL_PHASE_IDLE] = {"idle", IVL_DRIVE_OFF, false, {{may_arm, IVL_PHASE_READY}}},
-    [IVL_PHASE_READY] = {"ready",
-                         IVL_DRIVE_HOVER,
-                         false,
-                         {{request_idle, IVL_PHASE_IDLE},
-                          {request_abort, IVL_PHASE_ABORTED},
-                          {unflyable, IVL_PHASE_ABORTED},
-                          {may_approach, IVL_PHASE_APPROACH}}},
-    [IVL_PHASE_APPROACH] = {"approach",
-                            IVL_DRIVE_APPROACH,
-                            true,
-                            {{request_idle, IVL_PHASE_IDLE},
-                             {request_abort, IVL_PHASE_ABORTED},
-                             {unflyable, IVL_PHASE_ABORTED},
-                             {request_hover, IVL_PHASE_READY},
-                             {triggered, IVL_PHASE_FLIP},
-                             {approach_too_long, IVL_PHASE_ABORTED}}},
-    [IVL_PHASE_FLIP] = {"flip",
-                        IVL_DRIVE_FLIP,
-                        false,
-                        {{request_idle, IVL_PHASE_IDLE},
-                         {contact, IVL_PHASE_ATTACHED},
-                         {request_abort, IVL_PHASE_COAST},
-                         {sense_lost, IVL_PHASE_COAST},
-                         {inverted, IVL_PHASE_COAST},
-                         {flip_too_long, IVL_PHASE_COAST}}},
-    [IVL_PHASE_COAST] = {"coast",
-                         IVL_DRIVE_OFF,
-                         false,
-                         {{request_idle, IVL_PHASE_IDLE},
-                          {contact, IVL_PHASE_ATTACHED},
-                          {hanging, IVL_PHASE_ATTACHED},
-                          {coast_over, IVL_PHASE_DONE}}},
-    [IVL_PHASE_ATTACHED] = {"attached", IVL_DRIVE_OFF, false, {{request_idle, IVL_PHASE_IDLE}, {attached_over, IVL_PHASE_DONE}}},
-    [IVL_PHASE_DONE] = {"done", IVL_DRIVE_OFF, false, {{request_idle, IVL_PHASE_IDLE}}},
-    [IVL_PHASE_ABORTED] = {"aborted", IVL_DRIVE_HOVER, false, {{request_idle, IVL_PHASE_IDLE}}},
+    [IVL_PHASE_IDLE] = {"idle", IVL_DRIVE_OFF, false,
+        {{may_arm,           IVL_PHASE_READY}}},
+    [IVL_PHASE_READY] = {"ready", IVL_DRIVE_HOVER, false,
+        {{request_idle,      IVL_PHASE_IDLE},
+         {request_abort,     IVL_PHASE_ABORTED},
+         {unflyable,         IVL_PHASE_ABORTED},
+         {may_approach,      IVL_PHASE_APPROACH}}},
+    [IVL_PHASE_APPROACH] = {"approach", IVL_DRIVE_APPROACH, true,
+        {{request_idle,      IVL_PHASE_IDLE},
+         {request_abort,     IVL_PHASE_ABORTED},
+         {unflyable,         IVL_PHASE_ABORTED},
+         {request_hover,     IVL_PHASE_READY},
+         {triggered,         IVL_PHASE_FLIP},
+         {approach_too_long, IVL_PHASE_ABORTED}}},
+    [IVL_PHASE_FLIP] = {"flip", IVL_DRIVE_FLIP, false,
+        {{request_idle,      IVL_PHASE_IDLE},
+         {contact,           IVL_PHASE_ATTACHED},
+         {request_abort,     IVL_PHASE_COAST},
+         {sense_lost,        IVL_PHASE_COAST},
+         {inverted,          IVL_PHASE_COAST},
+         {flip_too_long,     IVL_PHASE_COAST}}},
+    [IVL_PHASE_COAST] = {"coast", IVL_DRIVE_OFF, false,
+        {{request_idle,      IVL_PHASE_IDLE},
+         {contact,           IVL_PHASE_ATTACHED},
+         {hanging,           IVL_PHASE_ATTACHED},
+         {coast_over,        IVL_PHASE_DONE}}},
+    [IVL_PHASE_ATTACHED] = {"attached", IVL_DRIVE_OFF, false,
+        {{request_idle,      IVL_PHASE_IDLE},
+         {attached_over,     IVL_PHASE_DONE}}},
+    [IVL_PHASE_DONE] = {"done", IVL_DRIVE_OFF, false,
+        {{request_idle,      IVL_PHASE_IDLE}}},
+    [IVL_PHASE_ABORTED] = {"aborted", IVL_DRIVE_HOVER, false,
+        {{request_idle,      IVL_PHASE_IDLE}}},
 };
+// clang-format on
 
 // a row for every phase, and the numbers that logs and traces rely on
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_PHASE_COUNT, "one row a phase");
@@ -204,31 +203,30 @@ static void enter(ivl_state_t *state, ivl_phase_t next, ivl_ceiling_t ceiling, i
     state->n_phase_tick = 0;
     switch (next)
     {
-        case IVL_PHASE_READY:
-            enter_ready(state);
-            state->p_hold_W_m = sample->p_WB_m;
-            break;
-        case IVL_PHASE_APPROACH:
-            ivl_approach_begin(&state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps,
-                               state->sense.cmd.angle_rad);
-            break;
-        case IVL_PHASE_FLIP:
-            state->triggered = true;
-            state->diag.n_trigger++;
-            ivl_trigger_latch(&state->snapshot, sample, ceiling, cues, &state->policy);
-            break;
-        case IVL_PHASE_ABORTED:
-            state->p_hold_W_m = sample->p_WB_m;
-            state->abort_cut = false;
-            state->diag.n_abort++;
-            break;
-        case IVL_PHASE_IDLE:
-        case IVL_PHASE_COAST:
-        case IVL_PHASE_ATTACHED:
-        case IVL_PHASE_DONE:
-        case IVL_PHASE_COUNT:
-        default:
-            break;
+    case IVL_PHASE_READY:
+        enter_ready(state);
+        state->p_hold_W_m = sample->p_WB_m;
+        break;
+    case IVL_PHASE_APPROACH:
+        ivl_approach_begin(&state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
+        break;
+    case IVL_PHASE_FLIP:
+        state->triggered = true;
+        state->diag.n_trigger++;
+        ivl_trigger_latch(&state->snapshot, sample, ceiling, cues, &state->policy);
+        break;
+    case IVL_PHASE_ABORTED:
+        state->p_hold_W_m = sample->p_WB_m;
+        state->abort_cut = false;
+        state->diag.n_abort++;
+        break;
+    case IVL_PHASE_IDLE:
+    case IVL_PHASE_COAST:
+    case IVL_PHASE_ATTACHED:
+    case IVL_PHASE_DONE:
+    case IVL_PHASE_COUNT:
+    default:
+        break;
     }
 }
 

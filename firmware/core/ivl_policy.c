@@ -3,8 +3,8 @@
 
 static bool in_range(const ivl_cfg_t *cfg, const ivl_policy_t *policy)
 {
-    return (policy->rrev_c_per_s >= 0.0f) && (policy->rrev_c_per_s <= cfg->rrev_c_per_s_max) && (policy->moment_y_Nm >= 0.0f)
-           && (policy->moment_y_Nm <= cfg->moment_y_Nm_max);
+    return (policy->rrev_c_per_s >= 0.0f) && (policy->rrev_c_per_s <= cfg->rrev_c_per_s_max) && (policy->moment_y_Nm >= 0.0f) &&
+           (policy->moment_y_Nm <= cfg->moment_y_Nm_max);
 }
 
 ivl_status_t ivl_policy_commit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy)

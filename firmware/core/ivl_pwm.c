@@ -15,8 +15,8 @@ bool ivl_pwm_curve_good(const ivl_cfg_t *cfg)
 {
     // the argument is linear in thrust, so its ends bound it
     const float rad_per_gf = 1.0f / cfg->pwm_c_gf;
-    return ivl_within(curve_rad(cfg, 0.0f, rad_per_gf), CURVE_RAD_MAX)
-           && ivl_within(curve_rad(cfg, cfg->motor_thrust_N_max, rad_per_gf), CURVE_RAD_MAX);
+    return ivl_within(curve_rad(cfg, 0.0f, rad_per_gf), CURVE_RAD_MAX) &&
+           ivl_within(curve_rad(cfg, cfg->motor_thrust_N_max, rad_per_gf), CURVE_RAD_MAX);
 }
 
 void ivl_pwm_of_thrust(const ivl_cfg_t *cfg, const float thrust_N[4], uint16_t pwm[4])

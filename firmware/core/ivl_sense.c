@@ -21,17 +21,17 @@ static bool command_good(const ivl_cfg_t *cfg, const ivl_command_t *cmd)
 {
     switch (cmd->request)
     {
-        case IVL_REQUEST_IDLE:
-        case IVL_REQUEST_ABORT:
-            return true;
-        case IVL_REQUEST_HOVER:
-            return ivl_vec3_within(cmd->p_hover_W_m, IVL_SENSE_P_M_MAX);
-        case IVL_REQUEST_APPROACH:
-            return (cmd->speed_mps >= cfg->speed_mps_min) && (cmd->speed_mps <= cfg->speed_mps_max) && (cmd->angle_rad >= 0.0f)
-                   && (cmd->angle_rad <= IVL_HALF_PI);
-        case IVL_REQUEST_COUNT:
-        default:
-            return false;
+    case IVL_REQUEST_IDLE:
+    case IVL_REQUEST_ABORT:
+        return true;
+    case IVL_REQUEST_HOVER:
+        return ivl_vec3_within(cmd->p_hover_W_m, IVL_SENSE_P_M_MAX);
+    case IVL_REQUEST_APPROACH:
+        return (cmd->speed_mps >= cfg->speed_mps_min) && (cmd->speed_mps <= cfg->speed_mps_max) && (cmd->angle_rad >= 0.0f) &&
+               (cmd->angle_rad <= IVL_HALF_PI);
+    case IVL_REQUEST_COUNT:
+    default:
+        return false;
     }
 }
 
@@ -51,9 +51,9 @@ static float pose_age_s(const ivl_cfg_t *cfg, const ivl_sense_t *sense, const iv
 
 static bool pose_good(const ivl_in_t *in, float q_norm2)
 {
-    return ivl_within(q_norm2 - 1.0f, IVL_SENSE_Q_NORM2_TOL) && ivl_vec3_within(in->p_WB_m, IVL_SENSE_P_M_MAX)
-           && ivl_vec3_within(in->v_WB_mps, IVL_SENSE_V_MPS_MAX) && ivl_vec3_within(in->w_B_radps, IVL_SENSE_W_RADPS_MAX)
-           && ivl_vec3_within(in->f_B_mps2, IVL_SENSE_F_MPS2_MAX);
+    return ivl_within(q_norm2 - 1.0f, IVL_SENSE_Q_NORM2_TOL) && ivl_vec3_within(in->p_WB_m, IVL_SENSE_P_M_MAX) &&
+           ivl_vec3_within(in->v_WB_mps, IVL_SENSE_V_MPS_MAX) && ivl_vec3_within(in->w_B_radps, IVL_SENSE_W_RADPS_MAX) &&
+           ivl_vec3_within(in->f_B_mps2, IVL_SENSE_F_MPS2_MAX);
 }
 
 static void accept(ivl_sense_t *sense, const ivl_in_t *in, float q_norm2, float age_s)

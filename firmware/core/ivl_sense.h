@@ -5,10 +5,10 @@
 #include "ivl_cfg.h"
 
 // limits beyond which a value is called impossible; all are far outside what the vehicle can do
-#define IVL_SENSE_P_M_MAX 200.0f       ///< m, each coordinate
-#define IVL_SENSE_V_MPS_MAX 50.0f      ///< m/s, each component
+#define IVL_SENSE_P_M_MAX     200.0f   ///< m, each coordinate
+#define IVL_SENSE_V_MPS_MAX   50.0f    ///< m/s, each component
 #define IVL_SENSE_W_RADPS_MAX 1000.0f  ///< rad/s, each component
-#define IVL_SENSE_F_MPS2_MAX 1.0e6f    ///< m/s^2, each component; high, since an impact is a spike
+#define IVL_SENSE_F_MPS2_MAX  1.0e6f   ///< m/s^2, each component; high, since an impact is a spike
 #define IVL_SENSE_Q_NORM2_TOL 0.05f    ///< |q|^2 may differ from 1 by this much; it is normalised
 
 /// The input of one tick: now, one sensed state, one command.

@@ -44,21 +44,21 @@ static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, fl
     ivl_reference_t ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
     switch (what)
     {
-        case IVL_DRIVE_HOVER:
-            ref.p_W_m = state->p_hold_W_m;
-            track(cfg, state, &ref, thrust_N);
-            break;
-        case IVL_DRIVE_APPROACH:
-            ref = ivl_approach_next(cfg, &state->approach, state->derived.dt_s);
-            track(cfg, state, &ref, thrust_N);
-            break;
-        case IVL_DRIVE_FLIP:
-            ivl_maneuver_thrusts(cfg, state->snapshot.policy.moment_y_Nm, thrust_N);
-            break;
-        case IVL_DRIVE_OFF:
-        default:
-            memset(thrust_N, 0, 4u * sizeof thrust_N[0]);
-            break;
+    case IVL_DRIVE_HOVER:
+        ref.p_W_m = state->p_hold_W_m;
+        track(cfg, state, &ref, thrust_N);
+        break;
+    case IVL_DRIVE_APPROACH:
+        ref = ivl_approach_next(cfg, &state->approach, state->derived.dt_s);
+        track(cfg, state, &ref, thrust_N);
+        break;
+    case IVL_DRIVE_FLIP:
+        ivl_maneuver_thrusts(cfg, state->snapshot.policy.moment_y_Nm, thrust_N);
+        break;
+    case IVL_DRIVE_OFF:
+    default:
+        memset(thrust_N, 0, 4u * sizeof thrust_N[0]);
+        break;
     }
 }
 

@@ -42,12 +42,12 @@
     X(float, "ivl", "speed_min", speed_mps_min, "m/s", 0.01, 10.0, 0.1, "smallest approach speed that is accepted")                          \
     X(float, "ivl", "speed_max", speed_mps_max, "m/s", 0.1, 10.0, 6.0, "largest approach speed that is accepted")                            \
     /* phases */                                                                                                                             \
-    X(float, "ivl", "ready_s_min", ready_s_min, "s", 0.0, 60.0, 0.0, "time in ready before an approach may start")                           \
+    X(float, "ivl", "ready_s_min", ready_s_min, "s", 0.0, 60.0, 0.0, "stay in ready before an approach may start")                           \
     X(float, "ivl", "stale_s_max", stale_s_max, "s", 0.002, 1.0, 0.1, "largest age of a sample that is still flown on")                      \
-    X(float, "ivl", "approach_s_max", approach_s_max, "s", 0.1, 60.0, 10.0, "an approach without trigger aborts after this time")            \
+    X(float, "ivl", "approach_s_max", approach_s_max, "s", 0.1, 60.0, 10.0, "an approach without trigger aborts after this")            \
     X(float, "ivl", "flip_s_max", flip_s_max, "s", 0.01, 5.0, 1.0, "motors are cut this long after the trigger at the latest")               \
-    X(float, "ivl", "coast_s_max", coast_s_max, "s", 0.1, 10.0, 2.5, "coast without contact ends after this time")                           \
-    X(float, "ivl", "attached_s", attached_s, "s", 0.0, 10.0, 1.0, "time in attached before done")                                           \
+    X(float, "ivl", "coast_s_max", coast_s_max, "s", 0.1, 10.0, 2.5, "coast without contact ends after this")                                \
+    X(float, "ivl", "attached_s", attached_s, "s", 0.0, 10.0, 1.0, "stay in attached before done")                                           \
     X(uint8_t, "ivl", "cut_at_inverted", cut_at_inverted, "1", 0, 1, 1, "cut motors when b_z passes the horizontal")                         \
     X(uint8_t, "ivl", "cut_on_contact", cut_on_contact, "1", 0, 1, 1, "cut motors at the first sensed contact")                              \
     X(float, "ivl", "contact_accel", contact_accel_mps2, "m/s^2", 12.0, 1000.0, 25.0, "specific force that means contact (a flip makes 10)") \
