@@ -9,7 +9,7 @@ FLAVOUR    ?= release
 JOBS       ?= $(shell getconf _NPROCESSORS_ONLN)
 EXPERIMENT ?= experiments/paper_vertical.yaml
 ifeq ($(origin CC),default)
-CC := gcc
+CC := $(if $(shell command -v gcc),gcc,cc)
 endif
 export CC CLANG
 
@@ -121,7 +121,7 @@ setup-dev: $(VENV)/.stamp-dev ## add what tests and lint need to .venv
 
 .PHONY: toolchain
 toolchain: ## install the compilers that the tests need (Debian; needs root only if one is missing)
-	@tools/apt_install.sh $(CC):gcc nm:binutils $(CLANG):clang-14
+	@tools/apt_install.sh $(firstword $(CC)):gcc nm:binutils $(CLANG):clang-14
 
 .PHONY: clean
 clean: ## remove what was compiled

@@ -12,7 +12,7 @@ called='sqrtf|fabsf|memcpy|memset|memcmp|memmove|_GLOBAL_OFFSET_TABLE_'
 failed=0
 
 fail() {
-    echo "error: $1" >&2
+    printf 'error: %s\n' "$1" >&2
     failed=1
 }
 
