@@ -18,7 +18,7 @@ BIN    := $(VENV)/bin
 UNITY  := build/unity
 GOLDEN := O0 release clang-O0 clang
 # a -j given by the user is passed on; without one the C code is compiled on all cores
-NATIVE  = $(MAKE) --no-print-directory -f tools/native.mk $(if $(findstring j,$(firstword -$(MAKEFLAGS))),,-j$(JOBS) -Otarget)
+NATIVE  = $(MAKE) --no-print-directory -f tools/native.mk $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS)) -Otarget
 say     = @printf '==> %s\n'
 pip     = $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint tools/constraints.txt
 
