@@ -38,7 +38,7 @@ setup: $(VENV)/.stamp-run ## create .venv with the package `ivl` and what it nee
 .PHONY: build
 build: ## compile firmware core and simulator into the library that Python loads
 	$(say) 'build: compiling firmware core and simulator ($(FLAVOUR))'
-	@$(NATIVE) FLAVOUR=$(FLAVOUR) lib
+	@+$(NATIVE) FLAVOUR=$(FLAVOUR) lib
 
 .PHONY: learn
 learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for another)
@@ -54,12 +54,12 @@ test: lint test-c san golden test-py test-mujoco ## everything below, set-up and
 .PHONY: test-c
 test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator (Unity)
 	$(say) 'test-c: C tests, strict warnings as errors'
-	@$(NATIVE) FLAVOUR=release check
+	@+$(NATIVE) FLAVOUR=release check
 
 .PHONY: san
 san: toolchain $(UNITY)/unity.c ## the same C tests under AddressSanitizer and UndefinedBehaviorSanitizer
 	$(say) 'san: C tests under ASan and UBSan'
-	@$(NATIVE) FLAVOUR=san check
+	@+$(NATIVE) FLAVOUR=san check
 
 .PHONY: golden
 golden: $(GOLDEN:%=golden-build-%) ## same bits from gcc and clang, -O0 and -O3, one thread or many
@@ -74,7 +74,7 @@ golden-update: $(GOLDEN:%=golden-build-%) ## accept the present hash as the refe
 .PHONY: $(GOLDEN:%=golden-build-%)
 $(GOLDEN:%=golden-build-%): golden-build-%: toolchain
 	$(say) 'golden: compiling $*'
-	@$(NATIVE) FLAVOUR=$* golden
+	@+$(NATIVE) FLAVOUR=$* golden
 
 .PHONY: test-py
 test-py: setup-dev build ## tests of the Python package
@@ -96,8 +96,8 @@ lint: setup-dev toolchain ## formatting, types, rules of the firmware core, equa
 	$(say) 'lint: clang-format'
 	@$(BIN)/clang-format --dry-run -Werror $(C_FILES) < /dev/null
 	$(say) 'lint: rules of the firmware core'
-	@$(NATIVE) FLAVOUR=O0 core
-	@$(NATIVE) FLAVOUR=release core
+	@+$(NATIVE) FLAVOUR=O0 core
+	@+$(NATIVE) FLAVOUR=release core
 	@tools/check_core.sh build/O0/firmware/core build/release/firmware/core
 	$(say) 'lint: equation references'
 	@$(BIN)/python tools/check_refs.py
