@@ -1,0 +1,232 @@
+#include "sil.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "sim_rollout.h"
+
+enum
+{
+    THREADS_MAX = 256,
+    CHUNK = 8 ///< rollouts that a thread takes at a time
+};
+
+// Parameters: those of the world, then those of the flight core under "firmware.", as doubles.
+
+typedef struct
+{
+    ivl_sim_params_t world;
+#define MEMBER(c_type, group, name, field, unit, lo, hi, dflt, doc) double firmware_##field;
+    IVL_PARAMS(MEMBER)
+#undef MEMBER
+} params_t;
+
+#define WORLD_ROW(group, name, suffix, unit, lo, hi, dflt, doc)                                                        \
+    {#group "." #name, "f8", (uint32_t)offsetof(params_t, world.group##_##name##_##suffix), 1, unit, lo, hi, dflt, doc},
+#define FIRMWARE_ROW(c_type, group, name, field, unit, lo, hi, dflt, doc)                                              \
+    {"firmware." name, "f8", (uint32_t)offsetof(params_t, firmware_##field), 1, unit, lo, hi, dflt, doc},
+static const ivl_sil_field_t PARAM_FIELDS[] = {IVL_SIM_PARAMS(WORLD_ROW) IVL_PARAMS(FIRMWARE_ROW)};
+
+#define ITEM_ROW(item, name, count, np, unit, lo, hi, dflt, doc)                                                       \
+    {#name, np, (uint32_t)offsetof(item, name), count, unit, lo, hi, dflt, doc},
+#define SPEC_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                     \
+    ITEM_ROW(ivl_sim_spec_t, name, count, np, unit, lo, hi, dflt, doc)
+#define OUTCOME_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                  \
+    ITEM_ROW(ivl_sim_outcome_t, name, count, np, unit, lo, hi, dflt, doc)
+#define TRACE_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                    \
+    ITEM_ROW(ivl_sim_trace_t, name, count, np, unit, lo, hi, dflt, doc)
+static const ivl_sil_field_t SPEC_FIELDS[] = {IVL_SIM_SPEC_FIELDS(SPEC_ROW)};
+static const ivl_sil_field_t OUTCOME_FIELDS[] = {IVL_SIM_OUTCOME_FIELDS(OUTCOME_ROW)};
+static const ivl_sil_field_t TRACE_FIELDS[] = {IVL_SIM_TRACE_FIELDS(TRACE_ROW)};
+
+// clang-format off
+/// X(name, unit, expression of the model m, doc)
+#define DERIVED(X) \
+    X(mass_total_kg, "kg", m->mass_total_kg, "body, legs and feet") \
+    X(thrust_to_weight, "1", IVL_SIM_MOTORS * m->raw.rotor_thrust_max_N / (m->mass_total_kg * m->raw.world_gravity_mps2), "all motors at their maximum") \
+    X(moment_y_max_Nmm, "N mm", 2000.0 * m->raw.rotor_thrust_max_N * m->raw.rotor_x_m, "front pair at its maximum") \
+    X(rotor_speed_hover_radps, "rad/s", m->rotor_speed_hover_radps, "each rotor") \
+    X(rotor_speed_max_radps, "rad/s", m->rotor_speed_max_radps, "each rotor") \
+    X(leg_frequency_radps, "rad/s", m->leg_frequency_radps, "of a leg about its hip, body held, undamped") \
+    X(leg_damping_ratio, "1", m->leg_damping_ratio, "of that motion") \
+    X(reach_m, "m", m->reach_m, "farthest point of the vehicle from the body origin") \
+    X(tick_s, "s", m->tick_s, "period of the flight core")
+// clang-format on
+#define MEMBER(name, unit, expression, doc) double name;
+typedef struct
+{
+    DERIVED(MEMBER)
+} derived_t;
+#undef MEMBER
+#define DERIVED_ROW(name, unit, expression, doc)                                                                       \
+    {#name, "f8", (uint32_t)offsetof(derived_t, name), 1, unit, 0.0, IVL_SIM_UNLIMITED, IVL_SIM_REQUIRED, doc},
+static const ivl_sil_field_t DERIVED_FIELDS[] = {DERIVED(DERIVED_ROW)};
+
+typedef struct
+{
+    const ivl_sil_field_t *fields;
+    uint32_t n, size;
+} table_t;
+
+#define TABLE(array, type) {array, (uint32_t)(sizeof array / sizeof array[0]), (uint32_t)sizeof(type)}
+static const table_t TABLES[] = {TABLE(PARAM_FIELDS, params_t), TABLE(SPEC_FIELDS, ivl_sim_spec_t),
+                                 TABLE(OUTCOME_FIELDS, ivl_sim_outcome_t), TABLE(TRACE_FIELDS, ivl_sim_trace_t),
+                                 TABLE(DERIVED_FIELDS, derived_t)};
+_Static_assert(sizeof TABLES / sizeof TABLES[0] == IVL_SIL_TABLE_COUNT, "one table each");
+
+int ivl_sil_abi_version(void)
+{
+    return IVL_SIL_ABI_VERSION;
+}
+
+const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *item_size)
+{
+    if (table < 0 || table >= IVL_SIL_TABLE_COUNT)
+    {
+        return NULL;
+    }
+    *n_fields = TABLES[table].n;
+    *item_size = TABLES[table].size;
+    return TABLES[table].fields;
+}
+
+static ivl_cfg_t firmware_of(const params_t *p)
+{
+    ivl_cfg_t cfg;
+#define ASSIGN(c_type, group, name, field, unit, lo, hi, dflt, doc) cfg.field = (c_type)p->firmware_##field;
+    IVL_PARAMS(ASSIGN)
+#undef ASSIGN
+    return cfg;
+}
+
+/// Ranges are checked on the doubles, before a conversion that would be undefined for a NaN or a large number.
+static int firmware_in_range(const params_t *p, char *error, size_t error_size)
+{
+#define CHECK(c_type, group, name, field, unit, lo, hi, dflt, doc)                                                     \
+    if (!(p->firmware_##field >= (lo) && p->firmware_##field <= (hi)))                                                 \
+    {                                                                                                                  \
+        snprintf(error, error_size, "firmware.%s: %g is outside the allowed range %g .. %g %s", name,                  \
+                 p->firmware_##field, (double)(lo), (double)(hi), unit);                                               \
+        return 0;                                                                                                      \
+    }
+    IVL_PARAMS(CHECK)
+#undef CHECK
+    return 1;
+}
+
+void *ivl_sil_model_create(const double *params, char *error, size_t error_size)
+{
+    params_t p;
+    memcpy(&p, params, sizeof p);
+    if (!firmware_in_range(&p, error, error_size))
+    {
+        return NULL;
+    }
+    const ivl_cfg_t firmware = firmware_of(&p);
+    ivl_sim_model_t *model = aligned_alloc(64, (sizeof *model + 63u) & ~(size_t)63u);
+    if (model == NULL)
+    {
+        snprintf(error, error_size, "out of memory");
+        return NULL;
+    }
+    if (!ivl_sim_model_init(model, &p.world, &firmware, error, error_size))
+    {
+        free(model);
+        return NULL;
+    }
+    return model;
+}
+
+void ivl_sil_model_free(void *model)
+{
+    free(model);
+}
+
+void ivl_sil_model_derived(const void *model, void *derived)
+{
+    const ivl_sim_model_t *m = model;
+    const derived_t d = {
+#define VALUE(name, unit, expression, doc) .name = (expression),
+        DERIVED(VALUE)
+#undef VALUE
+    };
+    memcpy(derived, &d, sizeof d);
+}
+
+typedef struct
+{
+    const ivl_sim_model_t *model;
+    const ivl_sim_spec_t *specs;
+    ivl_sim_outcome_t *outcomes;
+    size_t n;
+    atomic_size_t next;
+} batch_t;
+
+static void *fly_batch(void *argument)
+{
+    batch_t *batch = argument;
+    for (;;)
+    {
+        const size_t first = atomic_fetch_add(&batch->next, CHUNK);
+        if (first >= batch->n)
+        {
+            return NULL;
+        }
+        const size_t last = (first + CHUNK < batch->n) ? first + CHUNK : batch->n;
+        for (size_t i = first; i < last; i++)
+        {
+            ivl_sim_rollout(batch->model, &batch->specs[i], NULL, &batch->outcomes[i]);
+        }
+    }
+}
+
+static int thread_count(int asked, size_t n)
+{
+    long threads = (asked > 0) ? asked : sysconf(_SC_NPROCESSORS_ONLN);
+    const size_t chunks = (n + CHUNK - 1) / CHUNK;
+    threads = (threads < 1) ? 1 : ((threads > THREADS_MAX) ? THREADS_MAX : threads);
+    return ((size_t)threads > chunks) ? (int)((chunks > 0) ? chunks : 1) : (int)threads;
+}
+
+int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes)
+{
+    batch_t batch = {.model = model, .specs = specs, .outcomes = outcomes, .n = n};
+    pthread_t thread[THREADS_MAX];
+    atomic_init(&batch.next, 0);
+    const int extra = thread_count(n_threads, n) - 1;
+    int started = 0;
+    while (started < extra && pthread_create(&thread[started], NULL, fly_batch, &batch) == 0)
+    {
+        started++;
+    }
+    fly_batch(&batch); // this thread works too, so that a lack of others only costs time
+    for (int i = 0; i < started; i++)
+    {
+        pthread_join(thread[i], NULL);
+    }
+    return 0;
+}
+
+long ivl_sil_trace(const void *model, const void *spec, double period_s, void *rows, size_t capacity, void *outcome)
+{
+    if (!(period_s > 0.0))
+    {
+        return -1;
+    }
+    ivl_sim_tracer_t tracer = {.period_s = period_s, .rows = rows, .capacity = capacity};
+    ivl_sim_rollout(model, spec, &tracer, outcome);
+    return (long)tracer.n;
+}
+
+const char *ivl_sil_end_reason(int code)
+{
+    return ivl_sim_end_name(code);
+}
+
+const char *ivl_sil_phase_name(int code)
+{
+    return (code >= 0 && code < IVL_PHASE_COUNT) ? ivl_phase_name((ivl_phase_t)code) : "?";
+}

@@ -1,0 +1,324 @@
+/// @file sim_math.h
+/// Scalar, vector and four-lane arithmetic of the simulator.
+///
+/// Only + - * / and sqrt, which IEEE 754 rounds correctly everywhere, so that a rollout has the same bits on every host:
+/// the functions of libm differ between C libraries.  Double precision, SI, radians.  Pure, no state.
+#ifndef IVL_SIM_MATH_H
+#define IVL_SIM_MATH_H
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+// Vectors are passed by value only between inlined functions, so how the ABI would pass them does not matter.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+#define IVL_SIM_INLINE static inline __attribute__((always_inline))
+
+static const double IVL_SIM_PI = 3.14159265358979323846;
+
+/// Four doubles, one a leg.  Lanes never mix except where a sum over the legs is written out.
+typedef double ivl_v4_t __attribute__((vector_size(32)));
+typedef int64_t ivl_m4_t __attribute__((vector_size(32))); ///< comparison result: all bits set, or none
+
+typedef struct
+{
+    double x, y, z;
+} ivl_d3_t;
+
+IVL_SIM_INLINE ivl_d3_t ivl_d3(double x, double y, double z)
+{
+    return (ivl_d3_t){x, y, z};
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_d3_load(const double a[3])
+{
+    return (ivl_d3_t){a[0], a[1], a[2]};
+}
+
+IVL_SIM_INLINE void ivl_d3_store(double a[3], ivl_d3_t v)
+{
+    a[0] = v.x;
+    a[1] = v.y;
+    a[2] = v.z;
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_d3_add(ivl_d3_t a, ivl_d3_t b)
+{
+    return (ivl_d3_t){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_d3_sub(ivl_d3_t a, ivl_d3_t b)
+{
+    return (ivl_d3_t){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_d3_scale(double s, ivl_d3_t a)
+{
+    return (ivl_d3_t){s * a.x, s * a.y, s * a.z};
+}
+
+IVL_SIM_INLINE double ivl_d3_dot(ivl_d3_t a, ivl_d3_t b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_d3_cross(ivl_d3_t a, ivl_d3_t b)
+{
+    return (ivl_d3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Rotation matrix body to world, by rows: `row[2]` holds the world z components of the body axes.
+typedef struct
+{
+    ivl_d3_t row[3];
+} ivl_rot_t;
+
+/// R_WB of a quaternion x, y, z, w that need not be normalised exactly (the stages of a Runge-Kutta step are not).
+IVL_SIM_INLINE ivl_rot_t ivl_rot_from_quat(const double q[4])
+{
+    const double x = q[0], y = q[1], z = q[2], w = q[3];
+    const double s = 2.0 / (x * x + y * y + z * z + w * w);
+    const double xs = x * s, ys = y * s, zs = z * s;
+    ivl_rot_t R;
+    R.row[0] = ivl_d3(1.0 - (y * ys + z * zs), x * ys - w * zs, x * zs + w * ys);
+    R.row[1] = ivl_d3(x * ys + w * zs, 1.0 - (x * xs + z * zs), y * zs - w * xs);
+    R.row[2] = ivl_d3(x * zs - w * ys, y * zs + w * xs, 1.0 - (x * xs + y * ys));
+    return R;
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_rot_apply(const ivl_rot_t *R, ivl_d3_t a)
+{
+    return ivl_d3(ivl_d3_dot(R->row[0], a), ivl_d3_dot(R->row[1], a), ivl_d3_dot(R->row[2], a));
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_rot_apply_inverse(const ivl_rot_t *R, ivl_d3_t a)
+{
+    return ivl_d3_add(ivl_d3_add(ivl_d3_scale(a.x, R->row[0]), ivl_d3_scale(a.y, R->row[1])),
+                      ivl_d3_scale(a.z, R->row[2]));
+}
+
+/// Three components of a vector per leg.
+typedef struct
+{
+    ivl_v4_t x, y, z;
+} ivl_l3_t;
+
+IVL_SIM_INLINE ivl_v4_t ivl_v4_load(const double a[4])
+{
+    ivl_v4_t v;
+    memcpy(&v, a, sizeof v);
+    return v;
+}
+
+IVL_SIM_INLINE void ivl_v4_store(double a[4], ivl_v4_t v)
+{
+    memcpy(a, &v, sizeof v);
+}
+
+IVL_SIM_INLINE ivl_v4_t ivl_v4_set(double a)
+{
+    return (ivl_v4_t){a, a, a, a};
+}
+
+IVL_SIM_INLINE ivl_v4_t ivl_v4_sqrt(ivl_v4_t a)
+{
+    return (ivl_v4_t){sqrt(a[0]), sqrt(a[1]), sqrt(a[2]), sqrt(a[3])};
+}
+
+IVL_SIM_INLINE ivl_v4_t ivl_v4_select(ivl_m4_t m, ivl_v4_t yes, ivl_v4_t no)
+{
+    return (ivl_v4_t)((m & (ivl_m4_t)yes) | (~m & (ivl_m4_t)no));
+}
+
+IVL_SIM_INLINE ivl_v4_t ivl_v4_abs(ivl_v4_t a)
+{
+    return (ivl_v4_t)((ivl_m4_t)a & 0x7fffffffffffffffLL);
+}
+
+IVL_SIM_INLINE double ivl_v4_sum(ivl_v4_t a)
+{
+    return (a[0] + a[1]) + (a[2] + a[3]);
+}
+
+IVL_SIM_INLINE ivl_l3_t ivl_l3_load(const double a[3][4])
+{
+    return (ivl_l3_t){ivl_v4_load(a[0]), ivl_v4_load(a[1]), ivl_v4_load(a[2])};
+}
+
+IVL_SIM_INLINE void ivl_l3_store(double a[3][4], ivl_l3_t v)
+{
+    ivl_v4_store(a[0], v.x);
+    ivl_v4_store(a[1], v.y);
+    ivl_v4_store(a[2], v.z);
+}
+
+IVL_SIM_INLINE ivl_l3_t ivl_l3_set(ivl_d3_t a)
+{
+    return (ivl_l3_t){ivl_v4_set(a.x), ivl_v4_set(a.y), ivl_v4_set(a.z)};
+}
+
+IVL_SIM_INLINE ivl_l3_t ivl_l3_add(ivl_l3_t a, ivl_l3_t b)
+{
+    return (ivl_l3_t){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+IVL_SIM_INLINE ivl_l3_t ivl_l3_sub(ivl_l3_t a, ivl_l3_t b)
+{
+    return (ivl_l3_t){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+IVL_SIM_INLINE ivl_l3_t ivl_l3_scale(ivl_v4_t s, ivl_l3_t a)
+{
+    return (ivl_l3_t){s * a.x, s * a.y, s * a.z};
+}
+
+IVL_SIM_INLINE ivl_v4_t ivl_l3_dot(ivl_l3_t a, ivl_l3_t b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+IVL_SIM_INLINE ivl_l3_t ivl_l3_cross(ivl_l3_t a, ivl_l3_t b)
+{
+    return (ivl_l3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_l3_sum(ivl_l3_t a)
+{
+    return ivl_d3(ivl_v4_sum(a.x), ivl_v4_sum(a.y), ivl_v4_sum(a.z));
+}
+
+IVL_SIM_INLINE ivl_d3_t ivl_l3_lane(ivl_l3_t a, int leg)
+{
+    return ivl_d3(a.x[leg], a.y[leg], a.z[leg]);
+}
+
+/// world to body, lane by lane
+IVL_SIM_INLINE ivl_l3_t ivl_rot_apply_inverse_l3(const ivl_rot_t *R, ivl_l3_t a)
+{
+    const ivl_d3_t *r = R->row;
+    return (ivl_l3_t){r[0].x * a.x + r[1].x * a.y + r[2].x * a.z, r[0].y * a.x + r[1].y * a.y + r[2].y * a.z,
+                      r[0].z * a.x + r[1].z * a.y + r[2].z * a.z};
+}
+
+/// body to world, lane by lane
+IVL_SIM_INLINE ivl_l3_t ivl_rot_apply_l3(const ivl_rot_t *R, ivl_l3_t a)
+{
+    const ivl_d3_t *r = R->row;
+    return (ivl_l3_t){r[0].x * a.x + r[0].y * a.y + r[0].z * a.z, r[1].x * a.x + r[1].y * a.y + r[1].z * a.z,
+                      r[2].x * a.x + r[2].y * a.y + r[2].z * a.z};
+}
+
+// Polynomials below: interpolation of the function at Chebyshev nodes, computed with 40 digits; the stated error is that
+// of the polynomial, the rounding of double comes on top.
+
+/// atan(t) / t as a polynomial in t^2, |t| <= tan(pi/8), error 3.5e-17
+static const double IVL_SIM_ATAN[11] = {
+    0.99999999999999996532,  -0.33333333333328438572,  0.19999999998855110134,  -0.1428571418097646683,
+    0.1111110618045594522,   -0.090907730748084137897, 0.076899534963068577563, -0.066402339304294085887,
+    0.056883492268090104794, -0.043480522157164624777, 0.021135373157693245206};
+/// exp(x), |x| <= ln(2)/2, error 4.2e-18
+static const double IVL_SIM_EXP[12] = {
+    0.99999999999999999693,   0.99999999999999999976,    0.50000000000000183855,   0.16666666666666680806,
+    0.041666666666488095495,  0.0083333333333196006109,  0.0013888888952314774652, 0.00019841269890047113707,
+    2.4801485482328492419e-5, 2.7557240918578969823e-6,  2.7632639639041029749e-7, 2.5110037605963777712e-8};
+/// sin(x) / x and cos(x) as polynomials in x^2, |x| <= pi/4, errors 3.2e-18 and 3.0e-20
+static const double IVL_SIM_SIN[7] = {0.99999999999999999685,    -0.16666666666666616666,   0.0083333333333203624567,
+                                      -0.00019841269828650300013, 2.7557313376400129128e-6, -2.5050716974102745028e-8,
+                                      1.5894736651849095259e-10};
+static const double IVL_SIM_COS[8] = {0.99999999999999999997,   -0.49999999999999999371,   0.041666666666666452389,
+                                      -0.0013888888888861094596, 2.4801587283881153004e-5, -2.7557313097790086271e-7,
+                                      2.0875582380663953044e-9,  -1.1353379638297574126e-11};
+/// atanh(s) / s as a polynomial in s^2, |s| <= (sqrt 2 - 1)/(sqrt 2 + 1), error 1.2e-18
+static const double IVL_SIM_ATANH[8] = {0.99999999999999999887, 0.33333333333333822829, 0.19999999999651169056,
+                                        0.14285714380320839941, 0.11111098528363023304, 0.090918158401146644019,
+                                        0.07656264074182095483, 0.074048551803276383491};
+
+/// Angle of the point (c, s) from the first axis, four lanes, in [-pi, pi].
+IVL_SIM_INLINE ivl_v4_t ivl_v4_atan2(ivl_v4_t s, ivl_v4_t c)
+{
+    const ivl_v4_t zero = ivl_v4_set(0.0);
+    const ivl_v4_t abs_s = ivl_v4_abs(s), abs_c = ivl_v4_abs(c);
+    // first octant: t = lo/hi in [0, 1]; beyond tan(pi/8) turn by pi/4: t = (lo - hi)/(lo + hi)
+    const ivl_m4_t swap = abs_s > abs_c;
+    const ivl_v4_t lo = ivl_v4_select(swap, abs_c, abs_s);
+    const ivl_v4_t hi = ivl_v4_select(swap, abs_s, abs_c);
+    const ivl_m4_t turn = lo > 0.41421356237309504880 * hi;
+    const ivl_v4_t den = ivl_v4_select(turn, lo + hi, hi);
+    const ivl_v4_t t = ivl_v4_select(turn, lo - hi, lo) / ivl_v4_select(den > zero, den, ivl_v4_set(1.0));
+    const ivl_v4_t u = t * t;
+    ivl_v4_t p = ivl_v4_set(IVL_SIM_ATAN[10]);
+    for (int k = 9; k >= 0; k--)
+    {
+        p = p * u + IVL_SIM_ATAN[k];
+    }
+    p = p * t + ivl_v4_select(turn, ivl_v4_set(0.25 * IVL_SIM_PI), zero);
+    p = ivl_v4_select(swap, 0.5 * IVL_SIM_PI - p, p);
+    p = ivl_v4_select(c < zero, IVL_SIM_PI - p, p);
+    return ivl_v4_select(s < zero, -p, p);
+}
+
+IVL_SIM_INLINE double ivl_sim_atan2(double s, double c)
+{
+    return ivl_v4_atan2(ivl_v4_set(s), ivl_v4_set(c))[0];
+}
+
+IVL_SIM_INLINE double ivl_sim_polynomial(const double *coefficient, int n, double x)
+{
+    double p = coefficient[n - 1];
+    for (int k = n - 2; k >= 0; k--)
+    {
+        p = p * x + coefficient[k];
+    }
+    return p;
+}
+
+/// Sine and cosine for |x| <= 1e5.
+IVL_SIM_INLINE void ivl_sim_sincos(double x, double *sine, double *cosine)
+{
+    // x = n pi/2 + r with pi/2 in two parts (Cody-Waite), the first with 30 significant bits so that n times it is exact
+    const double n = floor(x * (2.0 / IVL_SIM_PI) + 0.5);
+    const double r = (x - n * 1.57079632673412561417e+00) - n * 6.07710050650619224932e-11;
+    const double u = r * r;
+    const double s = r * ivl_sim_polynomial(IVL_SIM_SIN, 7, u);
+    const double c = ivl_sim_polynomial(IVL_SIM_COS, 8, u);
+    const int64_t quadrant = (int64_t)n & 3;
+    const double a = (quadrant & 1) ? c : s, b = (quadrant & 1) ? s : c;
+    *sine = (quadrant & 2) ? -a : a;
+    *cosine = (quadrant == 1 || quadrant == 2) ? -b : b;
+}
+
+/// exp(x) for x <= 0; 0 below -700.
+IVL_SIM_INLINE double ivl_sim_exp(double x)
+{
+    if (!(x > -700.0))
+    {
+        return 0.0;
+    }
+    const double n = floor(x * 1.44269504088896340736 + 0.5);
+    const double r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
+    const uint64_t bits = (uint64_t)((int64_t)n + 1023) << 52;
+    double power;
+    memcpy(&power, &bits, sizeof power);
+    return power * ivl_sim_polynomial(IVL_SIM_EXP, 12, r);
+}
+
+/// Natural logarithm of a positive, normal x.
+IVL_SIM_INLINE double ivl_sim_log(double x)
+{
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    double e = (double)(int64_t)(bits >> 52) - 1023.0;
+    bits = (bits & 0x000fffffffffffffULL) | 0x3ff0000000000000ULL;
+    double m;
+    memcpy(&m, &bits, sizeof m);
+    if (m > 1.41421356237309504880)
+    {
+        m *= 0.5;
+        e += 1.0;
+    }
+    const double s = (m - 1.0) / (m + 1.0);
+    return e * 0.69314718055994530942 + 2.0 * s * ivl_sim_polynomial(IVL_SIM_ATANH, 8, s * s);
+}
+
+#endif // IVL_SIM_MATH_H

@@ -1,0 +1,156 @@
+#include "sim_model.h"
+
+#include <stdio.h>
+
+typedef struct
+{
+    const char *name, *unit;
+    double lo, hi;
+} range_t;
+
+#define RANGE(group, name, suffix, unit, lo, hi, dflt, doc) {#group "." #name, unit, lo, hi},
+static const range_t RANGES[] = {IVL_SIM_PARAMS(RANGE)};
+#undef RANGE
+
+static bool in_range(const ivl_sim_params_t *raw, char *error, size_t error_size)
+{
+    const double *value = (const double *)raw;
+    for (size_t i = 0; i < sizeof RANGES / sizeof RANGES[0]; i++)
+    {
+        const range_t *r = &RANGES[i];
+        // positive form: NaN is refused
+        if (!(value[i] >= r->lo && value[i] <= r->hi))
+        {
+            snprintf(error, error_size, "%s: %g is outside the allowed range %g .. %g %s", r->name, value[i], r->lo, r->hi,
+                     r->unit);
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Motors and legs stand at azimuth -45, -135, 135, 45 degrees: 1 front-right, 2 rear-right, 3 rear-left, 4 front-left.
+static const double SIGN_X[4] = {1.0, -1.0, -1.0, 1.0};
+static const double SIGN_Y[4] = {-1.0, -1.0, 1.0, 1.0};
+/// Reaction torque on the body: motors 1 and 3 turn one way, 2 and 4 the other.
+static const double SPIN[4] = {-1.0, 1.0, -1.0, 1.0};
+
+static void derive_legs(ivl_sim_model_t *model)
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    ivl_sim_leg_model_t *leg = &model->leg;
+    double sin_psi, cos_psi;
+    ivl_sim_sincos(raw->leg_angle_deg * (IVL_SIM_PI / 180.0), &sin_psi, &cos_psi);
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        // outward direction of the leg's vertical plane
+        const double ox = SIGN_X[i] * sqrt(0.5), oy = SIGN_Y[i] * sqrt(0.5);
+        leg->hip_B_m.x[i] = SIGN_X[i] * raw->leg_hip_xy_m;
+        leg->hip_B_m.y[i] = SIGN_Y[i] * raw->leg_hip_xy_m;
+        leg->hip_B_m.z[i] = raw->leg_hip_z_m;
+        leg->rest_B.x[i] = sin_psi * ox;
+        leg->rest_B.y[i] = sin_psi * oy;
+        leg->rest_B.z[i] = -cos_psi;
+        leg->inplane_B.x[i] = cos_psi * ox;
+        leg->inplane_B.y[i] = cos_psi * oy;
+        leg->inplane_B.z[i] = sin_psi;
+        leg->sideways_B.x[i] = -oy;
+        leg->sideways_B.y[i] = ox;
+        leg->sideways_B.z[i] = 0.0;
+    }
+    leg->mass_hip_kg = raw->leg_mass_kg / 3.0;
+    leg->mass_cross_kg = raw->leg_mass_kg / 6.0;
+    leg->mass_foot_kg = raw->leg_mass_kg / 3.0 + raw->leg_foot_mass_kg;
+    leg->weight_hip_kg = raw->leg_mass_kg / 2.0;
+    leg->weight_foot_kg = raw->leg_mass_kg / 2.0 + raw->leg_foot_mass_kg;
+    leg->moment_pivot_kgm2 = leg->mass_foot_kg * raw->leg_length_m * raw->leg_length_m;
+    model->leg_frequency_radps = sqrt(raw->leg_stiffness_Nmprad / leg->moment_pivot_kgm2);
+    model->leg_damping_ratio = (raw->leg_stiffness_Nmprad > 0.0)
+                                   ? raw->leg_damping_Nmsprad / (2.0 * sqrt(raw->leg_stiffness_Nmprad * leg->moment_pivot_kgm2))
+                                   : 0.0;
+}
+
+static void derive_plate(ivl_sim_plate_t *plate, double size_x, double size_y, double size_z, double center_z)
+{
+    plate->half_m[0] = 0.5 * size_x;
+    plate->half_m[1] = 0.5 * size_y;
+    plate->half_m[2] = 0.5 * size_z;
+    plate->center_z_m = center_z;
+    for (int i = 0; i < IVL_SIM_CORNERS; i++)
+    {
+        plate->corner_B_m[0][i] = (i & 1) ? plate->half_m[0] : -plate->half_m[0];
+        plate->corner_B_m[1][i] = (i & 2) ? plate->half_m[1] : -plate->half_m[1];
+        plate->corner_B_m[2][i] = center_z + ((i & 4) ? plate->half_m[2] : -plate->half_m[2]);
+    }
+}
+
+static double reach(const ivl_sim_model_t *model)
+{
+    const ivl_d3_t hip = ivl_l3_lane(model->leg.hip_B_m, 0);
+    double farthest = sqrt(ivl_d3_dot(hip, hip)) + model->raw.leg_length_m + model->raw.leg_foot_radius_m;
+    for (int p = 0; p < IVL_SIM_PLATES; p++)
+    {
+        for (int i = 0; i < IVL_SIM_CORNERS; i++)
+        {
+            const double(*c)[IVL_SIM_CORNERS] = model->plate[p].corner_B_m;
+            const double distance = sqrt(c[0][i] * c[0][i] + c[1][i] * c[1][i] + c[2][i] * c[2][i]);
+            farthest = (distance > farthest) ? distance : farthest;
+        }
+    }
+    return farthest;
+}
+
+/// The flight core knows the vehicle that it flies: its copy of these numbers follows from the world's.
+static void tell_firmware(ivl_sim_model_t *model)
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    ivl_cfg_t *cfg = &model->firmware;
+    cfg->mass_kg = (float)model->mass_total_kg;
+    cfg->jxx_kgm2 = (float)raw->body_inertia_xx_kgm2;
+    cfg->jyy_kgm2 = (float)raw->body_inertia_yy_kgm2;
+    cfg->jzz_kgm2 = (float)raw->body_inertia_zz_kgm2;
+    cfg->gravity_mps2 = (float)raw->world_gravity_mps2;
+    cfg->arm_x_m = (float)raw->rotor_x_m;
+    cfg->arm_y_m = (float)raw->rotor_y_m;
+    cfg->torque_per_thrust_m = (float)raw->rotor_torque_constant_m;
+    cfg->motor_thrust_N_max = (float)raw->rotor_thrust_max_N;
+    cfg->h_ceil_m = (float)(raw->world_ceiling_height_m + raw->world_sensed_gap_offset_m);
+}
+
+bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, const ivl_cfg_t *firmware, char *error,
+                        size_t error_size)
+{
+    if (!in_range(raw, error, error_size))
+    {
+        return false;
+    }
+    memset(model, 0, sizeof *model);
+    model->raw = *raw;
+    model->firmware = *firmware;
+    derive_legs(model);
+    derive_plate(&model->plate[IVL_SIM_PROP_PLATE], raw->prop_plate_size_x_m, raw->prop_plate_size_y_m,
+                 raw->prop_plate_size_z_m, raw->prop_plate_center_z_m);
+    derive_plate(&model->plate[IVL_SIM_BASE_PLATE], raw->base_plate_size_x_m, raw->base_plate_size_y_m,
+                 raw->base_plate_size_z_m, raw->base_plate_center_z_m);
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        model->rotor_x_m[i] = SIGN_X[i] * raw->rotor_x_m;
+        model->rotor_y_m[i] = SIGN_Y[i] * raw->rotor_y_m;
+        model->rotor_spin[i] = SPIN[i];
+    }
+    model->mass_total_kg = raw->body_mass_kg + IVL_SIM_LEGS * (raw->leg_mass_kg + raw->leg_foot_mass_kg);
+    model->rotor_speed_max_radps = sqrt(raw->rotor_thrust_max_N / raw->rotor_thrust_constant_Ns2);
+    model->rotor_speed_hover_radps = sqrt(model->mass_total_kg * raw->world_gravity_mps2 /
+                                          (IVL_SIM_MOTORS * raw->rotor_thrust_constant_Ns2));
+    model->reach_m = reach(model);
+    tell_firmware(model);
+    if (ivl_cfg_check(&model->firmware) != IVL_OK)
+    {
+        const char *name = ivl_cfg_bad_name(&model->firmware);
+        snprintf(error, error_size, "firmware.%s: refused by the flight core: out of range, or at odds with the vehicle",
+                 name ? name : "?");
+        return false;
+    }
+    model->tick_s = 1.0 / (double)model->firmware.tick_hz;
+    return true;
+}

@@ -1,0 +1,71 @@
+/// @file sim_model.h
+/// The constant side of the world: raw parameters, and everything that follows from them, computed here and only here.
+///
+/// Frames: W world, z up, ceiling at z = ceiling_height; B body, x forward, y left, z up.  Legs and motors are numbered
+/// 1 front-right, 2 rear-right, 3 rear-left, 4 front-left; index 0..3.  SI, radians.
+#ifndef IVL_SIM_MODEL_H
+#define IVL_SIM_MODEL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "ivl.h"
+#include "sim_math.h"
+#include "sim_params.h"
+
+enum
+{
+    IVL_SIM_LEGS = 4,
+    IVL_SIM_MOTORS = 4,
+    IVL_SIM_CORNERS = 8, ///< of a plate
+    IVL_SIM_PLATES = 2,
+    IVL_SIM_PROP_PLATE = 0,
+    IVL_SIM_BASE_PLATE = 1,
+};
+
+typedef struct
+{
+    double corner_B_m[3][IVL_SIM_CORNERS]; ///< x, y, z of the eight corners
+    double half_m[3];                      ///< half sizes
+    double center_z_m;
+} ivl_sim_plate_t;
+
+/// A leg is a uniform rod between two nodes, hip and foot; its mass matrix is that of the linear rod element, exact for a
+/// rigid rod: kinetic energy = (hip v_h^2 + 2 cross v_h.v_f + foot v_f^2) / 2.              [MODEL eq. 4.1]
+typedef struct
+{
+    ivl_l3_t hip_B_m;        ///< pivots
+    ivl_l3_t rest_B;         ///< unit vector of the leg at rest
+    ivl_l3_t inplane_B;      ///< unit vector in the leg's vertical plane, direction of growing psi
+    ivl_l3_t sideways_B;     ///< unit vector across that plane, axis of the first hinge
+    double mass_hip_kg;      ///< m / 3
+    double mass_cross_kg;    ///< m / 6
+    double mass_foot_kg;     ///< m / 3 + foot
+    double weight_hip_kg;    ///< m / 2: share of the weight that acts at the hip
+    double weight_foot_kg;   ///< m / 2 + foot
+    double moment_pivot_kgm2; ///< moment of inertia about the hip
+} ivl_sim_leg_model_t;
+
+typedef struct
+{
+    ivl_sim_params_t raw;
+    ivl_sim_leg_model_t leg;
+    ivl_sim_plate_t plate[IVL_SIM_PLATES];
+    double rotor_x_m[IVL_SIM_MOTORS], rotor_y_m[IVL_SIM_MOTORS], rotor_spin[IVL_SIM_MOTORS]; ///< spin: sign of the torque on B
+    double mass_total_kg;
+    double rotor_speed_max_radps;
+    double rotor_speed_hover_radps;
+    double leg_frequency_radps; ///< of a leg swinging about its hip, body held
+    double leg_damping_ratio;
+    double reach_m; ///< largest distance of any point of the vehicle from the body origin
+    ivl_cfg_t firmware;
+    double tick_s; ///< of the firmware
+} ivl_sim_model_t;
+
+/// Checks raw parameters and derives the model.
+/// @param[in] firmware  flight parameters; those that describe the vehicle and the ceiling are overwritten from `raw`
+/// @param[out] error    one line naming the parameter, its value and the allowed range, if the result is false
+bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, const ivl_cfg_t *firmware, char *error,
+                        size_t error_size);
+
+#endif // IVL_SIM_MODEL_H

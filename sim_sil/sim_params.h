@@ -1,0 +1,94 @@
+/// @file sim_params.h
+/// Every raw parameter of the simulated world, once: name, unit, allowed range, default, meaning.
+///
+/// X(group, name, unit_suffix, unit, min, max, default, doc) makes the field `group_name_unit_suffix` of
+/// ivl_sim_params_t (double) and the entry "group.name" of the table that the host reads.  A default of IVL_SIM_REQUIRED
+/// (NaN) means that the vehicle or gear file must give the value.  Derived values are not here: see ivl_sim_model_t.
+#ifndef IVL_SIM_PARAMS_H
+#define IVL_SIM_PARAMS_H
+
+#include <math.h>
+
+#define IVL_SIM_REQUIRED ((double)NAN)
+#define IVL_SIM_UNLIMITED ((double)INFINITY)
+
+// clang-format off
+#define IVL_SIM_PARAMS(X) \
+    X(world, gravity, mps2, "m/s^2", 0.0, 30.0, 9.81, "acceleration of gravity") \
+    X(world, ceiling_height, m, "m", 0.5, 20.0, 3.0, "height of the ceiling's surface") \
+    X(world, sensed_gap_offset, m, "m", -0.1, 0.1, 0.0, "height of the plane that the cues refer to, above the surface") \
+    X(body, mass, kg, "kg", 0.001, 10.0, IVL_SIM_REQUIRED, "airframe with battery, without legs; centre of mass at the body origin") \
+    X(body, inertia_xx, kgm2, "kg m^2", 1.0e-7, 1.0, IVL_SIM_REQUIRED, "principal moment of inertia of the airframe about body x") \
+    X(body, inertia_yy, kgm2, "kg m^2", 1.0e-7, 1.0, IVL_SIM_REQUIRED, "about body y") \
+    X(body, inertia_zz, kgm2, "kg m^2", 1.0e-7, 1.0, IVL_SIM_REQUIRED, "about body z") \
+    X(rotor, x, m, "m", 0.001, 1.0, IVL_SIM_REQUIRED, "distance of each motor from the body y axis") \
+    X(rotor, y, m, "m", 0.001, 1.0, IVL_SIM_REQUIRED, "distance of each motor from the body x axis") \
+    X(rotor, z, m, "m", -0.5, 0.5, IVL_SIM_REQUIRED, "height of the motors above the body origin") \
+    X(rotor, thrust_max, N, "N", 0.001, 100.0, IVL_SIM_REQUIRED, "largest thrust of one motor; commands beyond it saturate") \
+    X(rotor, thrust_constant, Ns2, "N s^2", 1.0e-10, 1.0e-3, IVL_SIM_REQUIRED, "thrust / (rotor speed in rad/s)^2") \
+    X(rotor, torque_constant, m, "m", 0.0, 0.1, IVL_SIM_REQUIRED, "reaction torque / thrust") \
+    X(rotor, tau_up, s, "s", 1.0e-6, 1.0, IVL_SIM_REQUIRED, "time constant of the rotor speed, speeding up") \
+    X(rotor, tau_down, s, "s", 1.0e-6, 1.0, IVL_SIM_REQUIRED, "time constant of the rotor speed, slowing down") \
+    X(rotor, thrust_scatter, norm, "1", 0.0, 0.5, 0.0, "standard deviation of each motor's relative thrust error, drawn once a rollout") \
+    X(prop_plate, size_x, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "box that stands for the rotors' disc: length") \
+    X(prop_plate, size_y, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "width") \
+    X(prop_plate, size_z, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "thickness") \
+    X(prop_plate, center_z, m, "m", -0.5, 0.5, IVL_SIM_REQUIRED, "height of its centre above the body origin") \
+    X(base_plate, size_x, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "box that stands for the airframe's underside: length") \
+    X(base_plate, size_y, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "width") \
+    X(base_plate, size_z, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "thickness") \
+    X(base_plate, center_z, m, "m", -0.5, 0.5, IVL_SIM_REQUIRED, "height of its centre above the body origin") \
+    X(plate, stiffness, Npm, "N/m", 1.0, 1.0e5, 5000.0, "contact stiffness of one plate corner on the ceiling") \
+    X(plate, damping, spm, "s/m", 0.0, 10.0, 0.7, "Hunt-Crossley damping: force = k x (1 + damping dx/dt)") \
+    X(plate, friction, norm, "1", 0.0, 2.0, 0.3, "Coulomb coefficient of a corner sliding on the ceiling") \
+    X(plate, slip_speed, mps, "m/s", 0.05, 5.0, 0.3, "sliding speed at which friction reaches 71 % of Coulomb's value") \
+    X(aero, drag_xy, Nspm, "N s/m", 0.0, 1.0, 0.0, "air drag of the body per speed, along body x and y") \
+    X(aero, drag_z, Nspm, "N s/m", 0.0, 1.0, 0.0, "air drag of the body per speed, along body z") \
+    X(aero, yaw_torque, norm, "1", 0.0, 1.0, 1.0, "share of the rotors' reaction torque that acts on the body; 0 switches it off") \
+    X(aero, ceiling_gain, norm, "1", 0.0, 2.0, 0.0, "ceiling effect: thrust grows by gain (rotor radius / gap)^2") \
+    X(aero, rotor_radius, m, "m", 0.001, 0.5, 0.0231, "radius of a rotor, for the ceiling effect") \
+    X(leg, length, m, "m", 0.005, 0.5, IVL_SIM_REQUIRED, "from the hip's pivot to the centre of the foot") \
+    X(leg, angle, deg, "deg", 0.0, 90.0, IVL_SIM_REQUIRED, "rest angle psi between leg and -z of the body, outward") \
+    X(leg, mass, kg, "kg", 1.0e-5, 0.1, IVL_SIM_REQUIRED, "of one leg, a uniform rod") \
+    X(leg, stiffness, Nmprad, "N m/rad", 0.0, 10.0, IVL_SIM_REQUIRED, "torsional spring of each of the hip's two hinges") \
+    X(leg, damping, Nmsprad, "N m s/rad", 0.0, 0.1, IVL_SIM_REQUIRED, "torsional damper of each of the hip's two hinges") \
+    X(leg, hip_xy, m, "m", 0.0, 0.5, IVL_SIM_REQUIRED, "distance of the hip's pivot from the body x axis and from the y axis") \
+    X(leg, hip_z, m, "m", -0.5, 0.5, IVL_SIM_REQUIRED, "height of the hip's pivot above the body origin") \
+    X(leg, foot_radius, m, "m", 0.0, 0.05, IVL_SIM_REQUIRED, "of the adhesive sphere at the end of the leg") \
+    X(leg, foot_mass, kg, "kg", 0.0, 0.1, IVL_SIM_REQUIRED, "of the adhesive sphere") \
+    X(leg, adhesion, N, "N", 0.0, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "pull along the ceiling's normal at which a stuck foot comes off; .inf never") \
+    X(leg, stick_delay, s, "s", 0.0, 1.0, 0.0, "time for which a foot must press on the ceiling before it sticks") \
+    X(leg, foot_damping, Nmsprad, "N m s/rad", 0.0, 0.1, 0.0, "friction of a stuck foot's ball joint against the swing of the leg") \
+    X(sense, pose_rate, hz, "Hz", 1.0, 1000.0, 100.0, "rate of the position and velocity samples, held in between") \
+    X(sense, phase_random, norm, "1", 0.0, 1.0, 1.0, "1: the sensor's clock has a random offset in each rollout; 0: it starts with the rollout") \
+    X(sense, latency, s, "s", 0.0, 0.1, 0.0, "from the sampling instant to the delivery of a pose sample") \
+    X(sense, position_noise, m, "m", 0.0, 1.0, 0.0, "standard deviation of each component of a position sample") \
+    X(sense, velocity_noise, mps, "m/s", 0.0, 5.0, 0.0, "standard deviation of each component of a velocity sample") \
+    X(sense, attitude_noise, rad, "rad", 0.0, 0.5, 0.0, "standard deviation of each component of the attitude error") \
+    X(sense, gyro_noise, radps, "rad/s", 0.0, 5.0, 0.0, "standard deviation of each component of the angular rate") \
+    X(sense, gyro_max, radps, "rad/s", 1.0, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "full scale of the gyro; readings clip there") \
+    X(sense, accel_noise, mps2, "m/s^2", 0.0, 50.0, 0.0, "standard deviation of each component of the specific force") \
+    X(sense, accel_max, mps2, "m/s^2", 1.0, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "full scale of the accelerometer; readings clip there") \
+    X(start, hold_time, s, "s", 0.0, 5.0, 0.39, "flown start: time at full speed that is left, before the ceiling would be reached") \
+    X(end, contact_time, s, "s", 0.01, 10.0, 1.0, "a rollout ends this long after the first contact") \
+    X(end, missed_time, s, "s", 0.1, 10.0, 2.25, "or this long after the trigger, without a contact") \
+    X(end, time_max, s, "s", 0.1, 60.0, 5.0, "or this long after its start") \
+    X(step, flight, s, "s", 1.0e-6, 0.002, 0.002, "largest integration step before the first contact") \
+    X(step, touch, s, "s", 1.0e-6, 0.002, 0.0005, "integration step right after a contact event") \
+    X(step, plate, s, "s", 1.0e-6, 0.001, 0.0005, "largest integration step while a plate presses on the ceiling") \
+    X(step, swing, s, "s", 1.0e-6, 0.004, 0.002, "largest integration step after the first contact") \
+    X(step, growth, norm, "1", 1.0, 2.0, 1.1, "factor by which the step grows from one to the next") \
+    X(step, scale, norm, "1", 0.001, 1.0, 1.0, "multiplies all steps; for convergence studies")
+// clang-format on
+
+#define IVL_SIM_FIELD(group, name, suffix, unit, lo, hi, dflt, doc) double group##_##name##_##suffix; ///< doc
+
+/// Raw parameters, in the order of the table.
+typedef struct
+{
+    IVL_SIM_PARAMS(IVL_SIM_FIELD)
+} ivl_sim_params_t;
+
+#undef IVL_SIM_FIELD
+
+#endif // IVL_SIM_PARAMS_H

@@ -1,0 +1,38 @@
+/// @file sim_rng.h
+/// Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw, SC 2011, DOI 10.1145/2063384.2063405).
+///
+/// A draw is a pure function of (seed, rollout, purpose, counter): no state to carry, so the result of a rollout does not
+/// depend on which thread runs it, nor on what ran before.
+#ifndef IVL_SIM_RNG_H
+#define IVL_SIM_RNG_H
+
+#include <stdint.h>
+
+/// What a draw is for; each purpose has its own, independent sequence.
+typedef enum
+{
+    IVL_SIM_DRAW_SENSOR_PHASE, ///< offset of the pose sensor's clock
+    IVL_SIM_DRAW_POSITION,     ///< pose sensor, position noise
+    IVL_SIM_DRAW_VELOCITY,     ///< pose sensor, velocity noise
+    IVL_SIM_DRAW_ATTITUDE,     ///< attitude noise
+    IVL_SIM_DRAW_GYRO,         ///< gyro noise
+    IVL_SIM_DRAW_ACCEL,        ///< accelerometer noise
+    IVL_SIM_DRAW_THRUST,       ///< per-motor scatter of the thrust constant
+} ivl_sim_draw_t;
+
+typedef struct
+{
+    uint64_t seed;   ///< of the batch
+    uint64_t stream; ///< of the rollout in the batch
+} ivl_sim_rng_t;
+
+/// The Philox4x32-10 block function, as published.
+void ivl_sim_philox(const uint32_t counter[4], const uint32_t key[2], uint32_t out[4]);
+
+/// Uniform in (0, 1), `index` counting within the purpose.
+double ivl_sim_uniform(const ivl_sim_rng_t *rng, ivl_sim_draw_t purpose, uint32_t index);
+
+/// Four standard normal numbers (two Box-Muller pairs).
+void ivl_sim_normal4(const ivl_sim_rng_t *rng, ivl_sim_draw_t purpose, uint32_t index, double out[4]);
+
+#endif // IVL_SIM_RNG_H

@@ -1,0 +1,226 @@
+#include "sim_rollout.h"
+
+static const char *const END_NAMES[] = {"contact_time", "missed", "missed_time", "time_max", "refused", "not_finite"};
+_Static_assert(sizeof END_NAMES / sizeof END_NAMES[0] == IVL_SIM_END_COUNT, "a name for each end");
+
+const char *ivl_sim_end_name(int end)
+{
+    return (end >= 0 && end < IVL_SIM_END_COUNT) ? END_NAMES[end] : "?";
+}
+
+/// Distance from the plane of the cues at which a rollout starts.                               [MODEL eq. 6.1, 6.2]
+static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, double sin_angle)
+{
+    const double speed = spec->speed_mps[0];
+    switch ((ivl_sim_start_t)spec->start[0])
+    {
+    case IVL_SIM_START_FLOWN:
+        return sin_angle * (0.5 * speed * speed / (double)model->firmware.approach_accel_mps2 +
+                            speed * model->raw.start_hold_time_s);
+    case IVL_SIM_START_AT_TRIGGER:
+        return spec->d_ceil_m[0];
+    case IVL_SIM_START_IMPARTED:
+    case IVL_SIM_START_COUNT:
+    default:
+        return speed * sin_angle * 1.0;
+    }
+}
+
+static void request_approach(const ivl_sim_spec_t *spec, ivl_sim_world_t *world)
+{
+    ivl_command_t *cmd = &world->in.cmd;
+    cmd->request = IVL_REQUEST_APPROACH;
+    cmd->p_hover_W_m = (ivl_vec3_t){(float)world->kin.p_WB_m[0], (float)world->kin.p_WB_m[1], (float)world->kin.p_WB_m[2]};
+    cmd->speed_mps = (float)spec->speed_mps[0];
+    cmd->angle_rad = (float)(spec->angle_deg[0] * (IVL_SIM_PI / 180.0));
+}
+
+/// @return false if the flight core refuses the policy
+static bool start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_world_t *world)
+{
+    double sin_angle, cos_angle;
+    ivl_sim_sincos(spec->angle_deg[0] * (IVL_SIM_PI / 180.0), &sin_angle, &cos_angle);
+    const double plane = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m;
+    const double speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : spec->speed_mps[0];
+    const double p[3] = {0.0, 0.0, plane - start_distance(model, spec, sin_angle)};
+    const double v[3] = {speed * cos_angle, 0.0, speed * sin_angle};
+    const ivl_sim_rng_t rng = {spec->seed[0], spec->stream[0]};
+    ivl_sim_world_init(model, &rng, p, v, world);
+    request_approach(spec, world);
+    const bool at_once = spec->start[0] == IVL_SIM_START_AT_TRIGGER;
+    const ivl_policy_t policy = {.seq = 1,
+                                 .rrev_c_per_s = at_once ? 0.0f : (float)spec->rrev_c_per_s[0],
+                                 .moment_y_Nm = (float)(spec->moment_y_Nmm[0] * 1.0e-3)};
+    return ivl_policy_commit(&model->firmware, &world->firmware, &policy) == IVL_OK;
+}
+
+static void clear(ivl_sim_outcome_t *o)
+{
+    memset(o, 0, sizeof *o);
+    double *const fields[] = {o->t_trigger_s,   o->t_impact_s,    o->t_end_s,      o->theta_impact_deg,  o->vx_trigger_mps,
+                              o->vz_trigger_mps, o->rate_trigger_radps, o->vx_impact_mps, o->vz_impact_mps,
+                              o->rate_impact_radps, o->d_trigger_m, o->rrev_trigger, o->of_y_trigger, o->d_min_m};
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
+    {
+        fields[i][0] = (double)NAN;
+    }
+}
+
+/// Truth at the tick at which the flight core triggered, and what it saw.
+static void note_trigger(const ivl_sim_kin_t *before, double t_s, const ivl_state_t *firmware, ivl_sim_outcome_t *o)
+{
+    o->triggered[0] = 1;
+    o->t_trigger_s[0] = t_s;
+    o->vx_trigger_mps[0] = before->v_WB_mps[0];
+    o->vz_trigger_mps[0] = before->v_WB_mps[2];
+    o->rate_trigger_radps[0] = -before->w_B_radps[1];
+    o->d_trigger_m[0] = (double)firmware->snapshot.d_ceil_m;
+    o->rrev_trigger[0] = (double)firmware->snapshot.rrev_per_s;
+    o->of_y_trigger[0] = (double)firmware->snapshot.of_y_radps;
+}
+
+/// Nose-up pitch from the attitude itself, on the branch that the integral of the rate tells.
+static double pitch_deg(const ivl_sim_kin_t *kin)
+{
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    const double angle = ivl_sim_atan2(R.row[2].x, R.row[0].x);
+    const double turns = floor((kin->pitch_rad - angle) / (2.0 * IVL_SIM_PI) + 0.5);
+    return (angle + 2.0 * IVL_SIM_PI * turns) * (180.0 / IVL_SIM_PI);
+}
+
+static void note_end(const ivl_sim_world_t *world, ivl_sim_end_t end, ivl_sim_outcome_t *o)
+{
+    o->end_reason[0] = (int32_t)end;
+    o->t_end_s[0] = world->t_s;
+    o->n_legs[0] = ivl_sim_world_count_stuck(world);
+    memcpy(o->leg_order, world->stuck_order, sizeof o->leg_order);
+    o->body_contact[0] = world->plate_touched[IVL_SIM_PROP_PLATE] ? 1 : 0;
+    o->base_contact[0] = world->plate_touched[IVL_SIM_BASE_PLATE] ? 1 : 0;
+    o->d_min_m[0] = world->d_min_m;
+    o->n_steps[0] = world->n_step;
+    o->n_ticks[0] = world->n_tick;
+    if (world->impact.happened)
+    {
+        const ivl_sim_kin_t *kin = &world->impact.kin;
+        o->t_impact_s[0] = world->impact.t_s;
+        o->theta_impact_deg[0] = pitch_deg(kin);
+        o->vx_impact_mps[0] = kin->v_WB_mps[0];
+        o->vz_impact_mps[0] = kin->v_WB_mps[2];
+        o->rate_impact_radps[0] = -kin->w_B_radps[1];
+    }
+}
+
+/// With the motors cut the centre of mass is a projectile: if its apex plus the reach of the vehicle stays below the
+/// ceiling, no contact can follow.  The legs' share of the centre of mass lies within `reach` of the origin.
+static bool out_of_reach(const ivl_sim_world_t *world)
+{
+    const ivl_sim_model_t *model = world->model;
+    double linear[3], angular[3];
+    ivl_sim_momentum(model, &world->kin, linear, angular);
+    const double vz = linear[2] / model->mass_total_kg;
+    const double rise = (vz > 0.0) ? 0.5 * vz * vz / model->raw.world_gravity_mps2 : 0.0;
+    const double leg_share = 1.0 - model->raw.body_mass_kg / model->mass_total_kg;
+    const double reach = model->reach_m * (1.0 + 2.0 * leg_share);
+    return world->kin.p_WB_m[2] + rise + reach < model->raw.world_ceiling_height_m;
+}
+
+static bool ended(const ivl_sim_world_t *world, const ivl_sim_outcome_t *o, ivl_sim_end_t *end)
+{
+    const ivl_sim_params_t *raw = &world->model->raw;
+    const double slack = 1.0e-9;
+    if (!(fabs(world->kin.p_WB_m[2]) < 1.0e6 && fabs(world->kin.w_B_radps[1]) < 1.0e6))
+    {
+        *end = IVL_SIM_END_NOT_FINITE;
+        return true;
+    }
+    if (world->impact.happened)
+    {
+        *end = IVL_SIM_END_CONTACT_TIME;
+        return world->t_s >= world->impact.t_s + raw->end_contact_time_s - slack;
+    }
+    if (world->t_s >= raw->end_time_max_s - slack)
+    {
+        *end = IVL_SIM_END_TIME_MAX;
+        return true;
+    }
+    if (o->triggered[0] && world->t_s >= o->t_trigger_s[0] + raw->end_missed_time_s - slack)
+    {
+        *end = IVL_SIM_END_MISSED_TIME;
+        return true;
+    }
+    *end = IVL_SIM_END_MISSED;
+    return ivl_motors_latched_off(&world->firmware) && out_of_reach(world);
+}
+
+static void write_row(const ivl_sim_world_t *w, ivl_sim_trace_t *row)
+{
+    const ivl_sim_model_t *model = w->model;
+    row->t_s[0] = w->t_s;
+    memcpy(row->p_WB_m, w->kin.p_WB_m, sizeof row->p_WB_m);
+    memcpy(row->q_WB, w->kin.q_WB, sizeof row->q_WB);
+    memcpy(row->v_WB_mps, w->kin.v_WB_mps, sizeof row->v_WB_mps);
+    memcpy(row->w_B_radps, w->kin.w_B_radps, sizeof row->w_B_radps);
+    row->pitch_deg[0] = pitch_deg(&w->kin);
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        const double speed = w->rotor.speed_radps[i];
+        row->thrust_N[i] = w->rotor.scatter[i] * model->raw.rotor_thrust_constant_Ns2 * speed * speed;
+        row->thrust_cmd_N[i] = (double)w->out.thrust_N[i];
+    }
+    for (int leg = 0; leg < IVL_SIM_LEGS; leg++)
+    {
+        for (int axis = 0; axis < 3; axis++)
+        {
+            row->foot_W_m[3 * leg + axis] = w->kin.p_foot_W_m[axis][leg];
+        }
+        row->foot_state[leg] = (int8_t)w->contact.foot[leg];
+    }
+    row->phase[0] = (int32_t)w->firmware.phase;
+    row->body_contact[0] = w->plate_touched[IVL_SIM_PROP_PLATE] ? 1 : 0;
+    row->d_ceil_m[0] = model->raw.world_ceiling_height_m - w->kin.p_WB_m[2];
+    row->d_sensed_m[0] = (double)w->out.ceiling.d_ceil_m;
+    row->rrev_per_s[0] = (double)w->out.cues.rrev_per_s;
+    row->of_y_radps[0] = (double)w->out.cues.of_y_radps;
+    row->energy_J[0] = ivl_sim_energy(model, &w->kin);
+}
+
+/// A row for each period that has begun; the trace's period is a whole number of ticks at least.
+static void trace(ivl_sim_tracer_t *tracer, const ivl_sim_world_t *world)
+{
+    if (tracer == NULL || world->t_s < (double)tracer->n * tracer->period_s - 1.0e-9)
+    {
+        return;
+    }
+    if (tracer->n < tracer->capacity)
+    {
+        memset(&tracer->rows[tracer->n], 0, sizeof tracer->rows[0]);
+        write_row(world, &tracer->rows[tracer->n]);
+    }
+    tracer->n++;
+}
+
+void ivl_sim_rollout(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_tracer_t *tracer,
+                     ivl_sim_outcome_t *outcome)
+{
+    ivl_sim_world_t world;
+    ivl_sim_end_t end = IVL_SIM_END_REFUSED;
+    clear(outcome);
+    if (!start(model, spec, &world))
+    {
+        note_end(&world, end, outcome);
+        return;
+    }
+    trace(tracer, &world);
+    do
+    {
+        const ivl_sim_kin_t before = world.kin;
+        const double t_s = world.t_s;
+        ivl_sim_world_tick(&world);
+        if (world.firmware.triggered && !outcome->triggered[0])
+        {
+            note_trigger(&before, t_s, &world.firmware, outcome);
+        }
+        trace(tracer, &world);
+    } while (!ended(&world, outcome, &end));
+    note_end(&world, end, outcome);
+}

@@ -1,0 +1,76 @@
+#include "sim_rotor.h"
+
+void ivl_sim_rotor_init(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor)
+{
+    memset(rotor, 0, sizeof *rotor);
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        rotor->speed_radps[i] = model->rotor_speed_hover_radps;
+        rotor->command_radps[i] = model->rotor_speed_hover_radps;
+        rotor->scatter[i] = 1.0;
+    }
+}
+
+void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const float thrust_N[4])
+{
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        const double asked = (double)thrust_N[i], most = model->raw.rotor_thrust_max_N;
+        const double thrust = (asked > 0.0) ? ((asked < most) ? asked : most) : 0.0;
+        rotor->command_radps[i] = sqrt(thrust / model->raw.rotor_thrust_constant_Ns2);
+    }
+}
+
+/// Advances one rotor; returns the mean of (speed^2) over the step.
+static double spin(const ivl_sim_rotor_t *rotor, double tau_up, double tau_down, double *speed, double command)
+{
+    const double gap = *speed - command;
+    if (fabs(gap) < 1.0e-9)
+    {
+        *speed = command;
+        return command * command;
+    }
+    const double tau = (gap < 0.0) ? tau_up : tau_down;
+    const double decay = (gap < 0.0) ? rotor->decay_up : rotor->decay_down;
+    const double share = tau / rotor->dt_s;
+    *speed = command + gap * decay;
+    return command * command + 2.0 * command * gap * share * (1.0 - decay) +
+           0.5 * gap * gap * share * (1.0 - decay * decay);
+}
+
+/// Thrust gain near the ceiling, for an upright rotor.                                           [MODEL eq. 2.5]
+static double ceiling_effect(const ivl_sim_model_t *model, const ivl_sim_kin_t *state)
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    const ivl_rot_t R = ivl_rot_from_quat(state->q_WB);
+    const double gap = raw->world_ceiling_height_m - state->p_WB_m[2] - R.row[2].z * raw->rotor_z_m;
+    const double least = 0.5 * raw->aero_rotor_radius_m;
+    const double ratio = raw->aero_rotor_radius_m / ((gap > least) ? gap : least);
+    const double upright = (R.row[2].z > 0.0) ? R.row[2].z : 0.0;
+    return 1.0 + raw->aero_ceiling_gain_norm * upright * ratio * ratio;
+}
+
+ivl_sim_load_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const ivl_sim_kin_t *state,
+                                  double dt_s)
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    if (fabs(rotor->dt_s - dt_s) > 0.0)
+    {
+        rotor->dt_s = dt_s;
+        rotor->decay_up = ivl_sim_exp(-dt_s / raw->rotor_tau_up_s);
+        rotor->decay_down = ivl_sim_exp(-dt_s / raw->rotor_tau_down_s);
+    }
+    const double gain = (raw->aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, state) : 1.0;
+    ivl_sim_load_t load = {0.0, {0.0, 0.0, 0.0}};
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        const double square = spin(rotor, raw->rotor_tau_up_s, raw->rotor_tau_down_s, &rotor->speed_radps[i],
+                                   rotor->command_radps[i]);
+        const double thrust = rotor->scatter[i] * raw->rotor_thrust_constant_Ns2 * square;
+        load.thrust_N += gain * thrust;
+        load.torque_B_Nm[0] += gain * thrust * model->rotor_y_m[i];
+        load.torque_B_Nm[1] -= gain * thrust * model->rotor_x_m[i];
+        load.torque_B_Nm[2] += model->rotor_spin[i] * raw->aero_yaw_torque_norm * raw->rotor_torque_constant_m * thrust;
+    }
+    return load;
+}

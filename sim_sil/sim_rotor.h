@@ -1,0 +1,27 @@
+/// @file sim_rotor.h
+/// Four rotors: first-order lag on the rotor speed, thrust and torque proportional to its square.
+#ifndef IVL_SIM_ROTOR_H
+#define IVL_SIM_ROTOR_H
+
+#include "sim_dynamics.h"
+
+typedef struct
+{
+    double speed_radps[IVL_SIM_MOTORS];
+    double command_radps[IVL_SIM_MOTORS];
+    double scatter[IVL_SIM_MOTORS];    ///< factor on each thrust, 1 without scatter
+    double dt_s, decay_up, decay_down; ///< exp(-dt/tau) of the last step: most steps are alike
+} ivl_sim_rotor_t;
+
+/// Rotors that hover, and stay there.
+void ivl_sim_rotor_init(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor);
+
+/// New thrust commands, N per motor; beyond [0, thrust_max] they saturate.
+void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const float thrust_N[4]);
+
+/// Advances the rotors by dt and returns force and moment, each averaged over dt exactly.        [MODEL eq. 2.3, 2.4]
+/// @param[in] state  of the body at the start of the step, for the ceiling effect
+ivl_sim_load_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const ivl_sim_kin_t *state,
+                                  double dt_s);
+
+#endif // IVL_SIM_ROTOR_H

@@ -1,0 +1,142 @@
+#include "sim_sensors.h"
+
+// Microseconds that the core's clock shows at the start of a rollout: samples older than the start stay positive.
+static const double CLOCK_OFFSET_S = 1.0;
+
+static uint64_t clock_us(double t_s)
+{
+    return (uint64_t)((t_s + CLOCK_OFFSET_S) * 1.0e6 + 0.5);
+}
+
+static ivl_vec3_t to_float3(const double a[3])
+{
+    return (ivl_vec3_t){(float)a[0], (float)a[1], (float)a[2]};
+}
+
+static void add_noise(const ivl_sim_rng_t *rng, ivl_sim_draw_t purpose, uint32_t index, double sigma, double a[3])
+{
+    if (sigma > 0.0)
+    {
+        double n[4];
+        ivl_sim_normal4(rng, purpose, index, n);
+        for (int i = 0; i < 3; i++)
+        {
+            a[i] += sigma * n[i];
+        }
+    }
+}
+
+static void clip(double most, double a[3])
+{
+    for (int i = 0; i < 3; i++)
+    {
+        a[i] = (a[i] > most) ? most : ((a[i] < -most) ? -most : a[i]);
+    }
+}
+
+/// Takes the sample that fell due `age_s` ago, from the present state: exact for constant acceleration.
+static void take_pose(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
+                      const double a_W_mps2[3], double age_s, ivl_sim_sensors_t *sensors)
+{
+    ivl_sim_pose_t *pose = &sensors->queue[sensors->n_taken % IVL_SIM_POSE_QUEUE];
+    pose->t_s = sensors->next_s;
+    for (int i = 0; i < 3; i++)
+    {
+        pose->p_W_m[i] = state->p_WB_m[i] - age_s * (state->v_WB_mps[i] - 0.5 * age_s * a_W_mps2[i]);
+        pose->v_W_mps[i] = state->v_WB_mps[i] - age_s * a_W_mps2[i];
+    }
+    add_noise(rng, IVL_SIM_DRAW_POSITION, sensors->n_taken, model->raw.sense_position_noise_m, pose->p_W_m);
+    add_noise(rng, IVL_SIM_DRAW_VELOCITY, sensors->n_taken, model->raw.sense_velocity_noise_mps, pose->v_W_mps);
+    sensors->n_taken++;
+    sensors->next_s += 1.0 / model->raw.sense_pose_rate_hz;
+}
+
+static void deliver(const ivl_sim_model_t *model, double t_s, ivl_sim_sensors_t *sensors)
+{
+    while (sensors->n_delivered != sensors->n_taken)
+    {
+        const ivl_sim_pose_t *pose = &sensors->queue[sensors->n_delivered % IVL_SIM_POSE_QUEUE];
+        if (pose->t_s + model->raw.sense_latency_s > t_s)
+        {
+            return;
+        }
+        sensors->held = *pose;
+        sensors->n_delivered++;
+    }
+}
+
+void ivl_sim_sensors_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
+                          ivl_sim_sensors_t *sensors)
+{
+    const double period = 1.0 / model->raw.sense_pose_rate_hz;
+    const double phase =
+        model->raw.sense_phase_random_norm * ivl_sim_uniform(rng, IVL_SIM_DRAW_SENSOR_PHASE, 0) * period;
+    const double still[3] = {0.0, 0.0, 0.0};
+    sensors->n_taken = 0;
+    sensors->n_delivered = 0;
+    sensors->n_tick = 0;
+    // begin early enough that the first sample has been delivered at t = 0
+    sensors->next_s = phase - period;
+    while (sensors->next_s + model->raw.sense_latency_s > 0.0)
+    {
+        sensors->next_s -= period;
+    }
+    memcpy(sensors->v_last_W_mps, state->v_WB_mps, sizeof sensors->v_last_W_mps);
+    while (sensors->next_s <= 0.0)
+    {
+        take_pose(model, rng, state, still, -sensors->next_s, sensors);
+    }
+    deliver(model, 0.0, sensors);
+}
+
+static void read_attitude(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
+                          uint32_t tick, ivl_in_t *in)
+{
+    const double *q = state->q_WB;
+    double e[3] = {0.0, 0.0, 0.0};
+    add_noise(rng, IVL_SIM_DRAW_ATTITUDE, tick, 0.5 * model->raw.sense_attitude_noise_rad, e);
+    // q (e, 1), normalised: a small rotation by 2 e in the body's axes
+    const double s = 1.0 / sqrt(1.0 + e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+    in->q_WB.x = (float)(s * (q[0] + q[3] * e[0] + q[1] * e[2] - q[2] * e[1]));
+    in->q_WB.y = (float)(s * (q[1] + q[3] * e[1] + q[2] * e[0] - q[0] * e[2]));
+    in->q_WB.z = (float)(s * (q[2] + q[3] * e[2] + q[0] * e[1] - q[1] * e[0]));
+    in->q_WB.w = (float)(s * (q[3] - q[0] * e[0] - q[1] * e[1] - q[2] * e[2]));
+}
+
+static void read_imu(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
+                     ivl_sim_sensors_t *sensors, ivl_in_t *in)
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    double gyro[3], accel[3], mean[3] = {0.0, 0.0, raw->world_gravity_mps2};
+    memcpy(gyro, state->w_B_radps, sizeof gyro);
+    for (int i = 0; i < 3 && sensors->n_tick > 0; i++)
+    {
+        mean[i] += (state->v_WB_mps[i] - sensors->v_last_W_mps[i]) / model->tick_s;
+    }
+    memcpy(sensors->v_last_W_mps, state->v_WB_mps, sizeof sensors->v_last_W_mps);
+    const ivl_rot_t R = ivl_rot_from_quat(state->q_WB);
+    ivl_d3_store(accel, ivl_rot_apply_inverse(&R, ivl_d3_load(mean)));
+    add_noise(rng, IVL_SIM_DRAW_GYRO, sensors->n_tick, raw->sense_gyro_noise_radps, gyro);
+    add_noise(rng, IVL_SIM_DRAW_ACCEL, sensors->n_tick, raw->sense_accel_noise_mps2, accel);
+    clip(raw->sense_gyro_max_radps, gyro);
+    clip(raw->sense_accel_max_mps2, accel);
+    in->w_B_radps = to_float3(gyro);
+    in->f_B_mps2 = to_float3(accel);
+}
+
+void ivl_sim_sensors_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
+                          const double a_W_mps2[3], double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in)
+{
+    while (sensors->next_s <= t_s)
+    {
+        take_pose(model, rng, state, a_W_mps2, t_s - sensors->next_s, sensors);
+    }
+    deliver(model, t_s, sensors);
+    in->t_us = clock_us(t_s);
+    in->t_pose_us = clock_us(sensors->held.t_s);
+    in->p_WB_m = to_float3(sensors->held.p_W_m);
+    in->v_WB_mps = to_float3(sensors->held.v_W_mps);
+    read_attitude(model, rng, state, sensors->n_tick, in);
+    read_imu(model, rng, state, sensors, in);
+    sensors->n_tick++;
+}
