@@ -20,7 +20,7 @@ typedef struct
 {
     ivl_sim_params_t world;
 #define MEMBER(c_type, group, name, field, unit, lo, hi, dflt, doc) double firmware_##field;
-    IVL_PARAMS(MEMBER)
+    IVL_FLIGHT_PARAMS(MEMBER)
 #undef MEMBER
 } params_t;
 
@@ -28,7 +28,7 @@ typedef struct
     {#group "." #name, "f8", (uint32_t)offsetof(params_t, world.group##_##name##_##suffix), 1, unit, lo, hi, dflt, doc},
 #define FIRMWARE_ROW(c_type, group, name, field, unit, lo, hi, dflt, doc)                                              \
     {"firmware." name, "f8", (uint32_t)offsetof(params_t, firmware_##field), 1, unit, lo, hi, dflt, doc},
-static const ivl_sil_field_t PARAM_FIELDS[] = {IVL_SIM_PARAMS(WORLD_ROW) IVL_PARAMS(FIRMWARE_ROW)};
+static const ivl_sil_field_t PARAM_FIELDS[] = {IVL_SIM_PARAMS(WORLD_ROW) IVL_FLIGHT_PARAMS(FIRMWARE_ROW)};
 
 #define ITEM_ROW(item, name, count, np, unit, lo, hi, dflt, doc)                                                       \
     {#name, np, (uint32_t)offsetof(item, name), count, unit, lo, hi, dflt, doc},
@@ -96,8 +96,9 @@ const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *it
 static ivl_cfg_t firmware_of(const params_t *p)
 {
     ivl_cfg_t cfg;
+    ivl_cfg_defaults(&cfg); // those of the vehicle and the ceiling follow from the world
 #define ASSIGN(c_type, group, name, field, unit, lo, hi, dflt, doc) cfg.field = (c_type)p->firmware_##field;
-    IVL_PARAMS(ASSIGN)
+    IVL_FLIGHT_PARAMS(ASSIGN)
 #undef ASSIGN
     return cfg;
 }
@@ -112,7 +113,7 @@ static int firmware_in_range(const params_t *p, char *error, size_t error_size)
                  p->firmware_##field, (double)(lo), (double)(hi), unit);                                               \
         return 0;                                                                                                      \
     }
-    IVL_PARAMS(CHECK)
+    IVL_FLIGHT_PARAMS(CHECK)
 #undef CHECK
     return 1;
 }

@@ -8,7 +8,8 @@
 #define IVL_VARS_H
 
 // clang-format off
-#define IVL_PARAMS(X)                                                                                                                        \
+/// The vehicle and the place, as the core knows them: a simulator tells these from its own truth.
+#define IVL_VEHICLE_PARAMS(X)                                                                                                                \
     /* vehicle [S] */                                                                                                                        \
     X(float, "ivl", "mass", mass_kg, "kg", 0.005, 0.5, 0.03584, "mass of body and legs")                                                     \
     X(float, "ivl", "jxx", jxx_kgm2, "kg m^2", 1.0e-6, 1.0e-2, 49.35e-6, "moment of inertia about b_x")                                      \
@@ -20,8 +21,11 @@
     X(float, "ivl", "torque_per_thrust", torque_per_thrust_m, "m", 1.0e-4, 0.1, 0.00612, "drag torque of a rotor per thrust")                \
     X(float, "ivl", "motor_thrust_max", motor_thrust_N_max, "N", 0.01, 5.0, 0.1615, "largest thrust of one motor")                           \
     X(float, "ivl", "tick_hz", tick_hz, "Hz", 100.0, 2000.0, 500.0, "rate at which ivl_step is called")                                      \
+    X(float, "ivl", "h_ceil", h_ceil_m, "m", -100.0, 100.0, 2.1, "height in W of the plane that the cues refer to")
+
+/// How it flies.
+#define IVL_FLIGHT_PARAMS(X)                                                                                                                 \
     /* ceiling and cues */                                                                                                                   \
-    X(float, "ivl", "h_ceil", h_ceil_m, "m", -100.0, 100.0, 2.1, "height in W of the plane that the cues refer to")                          \
     X(float, "ivl", "d_ceil_min", d_ceil_m_min, "m", 0.001, 1.0, 0.01, "smallest distance that gives a valid cue")                           \
     X(float, "ivl", "d_ceil_max", d_ceil_m_max, "m", 0.1, 100.0, 5.0, "largest distance that gives a valid cue")                             \
     X(float, "ivl", "rrev_c_max", rrev_c_per_s_max, "1/s", 0.0, 20.0, 20.0, "largest trigger threshold that a policy may ask for")           \
@@ -44,7 +48,7 @@
     /* phases */                                                                                                                             \
     X(float, "ivl", "ready_s_min", ready_s_min, "s", 0.0, 60.0, 0.0, "stay in ready before an approach may start")                           \
     X(float, "ivl", "stale_s_max", stale_s_max, "s", 0.002, 1.0, 0.1, "largest age of a sample that is still flown on")                      \
-    X(float, "ivl", "approach_s_max", approach_s_max, "s", 0.1, 60.0, 10.0, "an approach without trigger aborts after this")            \
+    X(float, "ivl", "approach_s_max", approach_s_max, "s", 0.1, 60.0, 10.0, "an approach without trigger aborts after this")                 \
     X(float, "ivl", "flip_s_max", flip_s_max, "s", 0.01, 5.0, 1.0, "motors are cut this long after the trigger at the latest")               \
     X(float, "ivl", "coast_s_max", coast_s_max, "s", 0.1, 10.0, 2.5, "coast without contact ends after this")                                \
     X(float, "ivl", "attached_s", attached_s, "s", 0.0, 10.0, 1.0, "stay in attached before done")                                           \
@@ -58,6 +62,8 @@
     X(float, "ivl", "pwm_c", pwm_c_gf, "gf", 0.1, 1000.0, 11.2, "width of the thrust curve")                                                 \
     X(float, "ivl", "pwm_d", pwm_d, "1", -1.0e6, 1.0e6, 32600.0, "PWM at the middle of the thrust curve")                                    \
     X(float, "ivl", "pwm_max", pwm_max, "1", 1.0, 65535.0, 60000.0, "largest PWM value")
+
+#define IVL_PARAMS(X) IVL_VEHICLE_PARAMS(X) IVL_FLIGHT_PARAMS(X)
 
 /// A log row is X(ctype, group, name, struct, field, unit, doc): `field` is a member path for offsetof(struct, field).
 #define IVL_LOGS(X)                                                                                                      \
