@@ -20,11 +20,11 @@
     X(float, "ivl", "arm_y", arm_y_m, "m", 0.005, 0.2, 0.033, "distance of each motor from the b_x axis")                                    \
     X(float, "ivl", "torque_per_thrust", torque_per_thrust_m, "m", 1.0e-4, 0.1, 0.00612, "drag torque of a rotor per thrust")                \
     X(float, "ivl", "motor_thrust_max", motor_thrust_N_max, "N", 0.01, 5.0, 0.1615, "largest thrust of one motor")                           \
-    X(float, "ivl", "tick_hz", tick_hz, "Hz", 100.0, 2000.0, 500.0, "rate at which ivl_step is called")                                      \
     X(float, "ivl", "h_ceil", h_ceil_m, "m", -100.0, 100.0, 2.1, "height in W of the plane that the cues refer to")
 
 /// How it flies.
 #define IVL_FLIGHT_PARAMS(X)                                                                                                                 \
+    X(float, "ivl", "tick_hz", tick_hz, "Hz", 100.0, 2000.0, 500.0, "rate at which ivl_step is called")                                      \
     /* ceiling and cues */                                                                                                                   \
     X(float, "ivl", "d_ceil_min", d_ceil_m_min, "m", 0.001, 1.0, 0.01, "smallest distance that gives a valid cue")                           \
     X(float, "ivl", "d_ceil_max", d_ceil_m_max, "m", 0.1, 100.0, 5.0, "largest distance that gives a valid cue")                             \
