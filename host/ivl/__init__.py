@@ -1,0 +1,32 @@
+"""Inverted landing: learn to land a small multicopter on a ceiling, in simulation and on the vehicle.
+
+import ivl
+world = ivl.World(vehicle="habas2021", gear="wide_long", gear_set="as_simulated")
+out = world.rollouts(2.5, 90.0, rrev_c_per_s=4.8, moment_y_Nmm=8.0)
+"""
+
+from ivl.errors import ConfigError, IvlError, LearnerError, NativeError, RolloutError, StoreError
+from ivl.experiment import Experiment
+from ivl.learners import EPHE, Learner, RobustEPHE, make_learner
+from ivl.outcome import clean, four_leg
+from ivl.world import Trace, World
+
+__all__ = [
+    "EPHE",
+    "ConfigError",
+    "Experiment",
+    "IvlError",
+    "Learner",
+    "LearnerError",
+    "NativeError",
+    "RobustEPHE",
+    "RolloutError",
+    "StoreError",
+    "Trace",
+    "World",
+    "__version__",
+    "clean",
+    "four_leg",
+    "make_learner",
+]
+__version__ = "0.1.0"

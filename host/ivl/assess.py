@@ -1,0 +1,251 @@
+"""Judging a run: what the best policy could reach, and when, if ever, each trial's recommendation came close to it.
+
+Definitions, the same for every learner:
+
+best rate: The largest four-leg rate that any policy reaches in this world, by a dense grid over (RREV_c, M_yd). The
+    grid is refined in stages (more rollouts for the better points); the last stage flies fresh rollouts, so that the
+    figure is not inflated by having been selected.
+check: After each episode the recommended policy flies `n_fresh` fresh rollouts (random numbers of the check alone).
+solved: The check after the last episode reaches `share_of_best` of the best rate.
+converged at: The first multiple of N rollouts from which on every check reaches it.
+failed: Rollouts up to convergence (all of them if never) that were not four-leg landings: what a drone would suffer.
+stuck: Trials whose recommended policy at the end lands at less than half of the best rate.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ivl.experiment import Experiment, GridAxis
+from ivl.outcome import clean, four_leg
+from ivl.seeds import Purpose, derive
+from ivl.store import SCORED, EpisodeRow, RolloutRows
+from ivl.world import World
+
+STUCK_SHARE = 0.5
+_STAGES = ((1.0, 8), (0.1, 64), (0.01, 400))
+"""(share of the grid points that fly, rollouts of each), added to what they flew before."""
+_FINALISTS, _FINAL_ROLLOUTS = 10, 1000
+
+FloatArray = npt.NDArray[np.float64]
+OnStage = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Best:
+    """The best policy of a world and approach.
+
+    Attributes:
+        theta: The policy (RREV_c in 1/s, M_yd in N mm).
+        rate_four_leg: Its four-leg rate.
+        rate_clean: Its clean rate.
+        n_rollouts: Rollouts spent on the search.
+    """
+
+    theta: tuple[float, float]
+    rate_four_leg: float
+    rate_clean: float
+    n_rollouts: int
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How one trial went; see the module's definitions.
+
+    Attributes:
+        trial: Number of the trial.
+        solved: Whether the final recommendation is good.
+        rollouts_to_convergence: Rollouts until convergence, None if not solved.
+        rate_four_leg: Four-leg rate of the final recommendation over the fresh rollouts.
+        rate_clean: Its clean rate.
+        failed_landings: Rollouts up to convergence that were not four-leg landings.
+        failed_landings_total: The same over the whole budget.
+        body_contacts: Rollouts up to convergence in which body or rotors touched the ceiling.
+        stuck: Whether the final recommendation lands at less than half of the best rate.
+    """
+
+    trial: int
+    solved: bool
+    rollouts_to_convergence: int | None
+    rate_four_leg: float
+    rate_clean: float
+    failed_landings: int
+    failed_landings_total: int
+    body_contacts: int
+    stuck: bool
+
+
+def find_best(
+    world: World, experiment: Experiment, threads: int | None = None, on_stage: OnStage | None = None
+) -> Best:
+    """Search the grid of `experiment.check` for the policy of the largest four-leg rate.
+
+    Args:
+        world: Where to fly.
+        experiment: Approach and grid.
+        threads: Worker threads; omitted: all processors.
+        on_stage: Called with (stage, number of stages) before each.
+    """
+    theta = _grid(experiment.check.rrev_c_per_s, experiment.check.moment_y_Nmm)
+    landed, flown = np.zeros(len(theta)), np.zeros(len(theta))
+    n_stages, stream = len(_STAGES) + 1, 0
+    for stage, (share, n_each) in enumerate(_STAGES):
+        if on_stage:
+            on_stage(stage, n_stages)
+        rate = landed / np.maximum(flown, 1)
+        chosen = np.argsort(-rate, kind="stable")[: max(_FINALISTS, int(share * len(theta)))]
+        four, _ = _rates(world, experiment, theta[chosen], n_each, stream, threads)
+        landed[chosen] += four * n_each
+        flown[chosen] += n_each
+        stream += len(chosen) * n_each
+    if on_stage:
+        on_stage(n_stages - 1, n_stages)
+    finalists = theta[_most_landed(landed, flown)]
+    four, spotless = _rates(world, experiment, finalists, _FINAL_ROLLOUTS, stream, threads)
+    top = int(np.argmax(four))
+    policy = (float(finalists[top, 0]), float(finalists[top, 1]))
+    total = stream + len(finalists) * _FINAL_ROLLOUTS
+    return Best(policy, float(four[top]), float(spotless[top]), total)
+
+
+def judge(
+    world: World,
+    experiment: Experiment,
+    best: Best,
+    history: Sequence[EpisodeRow],
+    rollouts: RolloutRows,
+    threads: int | None = None,
+) -> list[Verdict]:
+    """Judge every trial of a finished run.
+
+    The checks are flown from the last one backwards, each trial until its first failure: earlier ones cannot change
+    its verdict.
+    """
+    needed = experiment.check.share_of_best * best.rate_four_leg
+    recommended = _recommendations(history, experiment.n_episodes)
+    n_trials, last = len(recommended), experiment.n_episodes - 1
+    converged = np.full(n_trials, -1)
+    final_four, final_clean = np.zeros(n_trials), np.zeros(n_trials)
+    alive = np.arange(n_trials)
+    for episode in range(last, -1, -1):
+        if not alive.size:
+            break
+        four, spotless = _check(world, experiment, recommended[alive, episode], alive, episode, threads)
+        if episode == last:
+            final_four, final_clean = four, spotless
+        alive = alive[four >= needed]
+        converged[alive] = episode
+    return [
+        _verdict(trial, experiment, int(converged[trial]), final_four[trial], final_clean[trial], best, rollouts)
+        for trial in range(n_trials)
+    ]
+
+
+def summarise(verdicts: Sequence[Verdict]) -> dict[str, Any]:
+    """Figures over all trials; never converged counts as infinitely late (printed as None)."""
+    rollouts = [v.rollouts_to_convergence if v.rollouts_to_convergence is not None else np.inf for v in verdicts]
+    failed = [v.failed_landings for v in verdicts]
+    n_stuck = sum(v.stuck for v in verdicts)
+    return {
+        "trials": len(verdicts),
+        "solved": sum(v.solved for v in verdicts),
+        "rollouts_to_convergence": {"median": _quantile(rollouts, 0.5), "p90": _quantile(rollouts, 0.9)},
+        "failed_landings": {"median": _quantile(failed, 0.5), "p90": _quantile(failed, 0.9)},
+        "stuck": n_stuck / len(verdicts),
+        "stuck_trials": n_stuck,
+        "body_contacts": {"median": _quantile([v.body_contacts for v in verdicts], 0.5)},
+        "failed_landings_total": {"median": _quantile([v.failed_landings_total for v in verdicts], 0.5)},
+        "landing_rate_four_leg": float(np.mean([v.rate_four_leg for v in verdicts])),
+        "landing_rate_clean": float(np.mean([v.rate_clean for v in verdicts])),
+    }
+
+
+def _grid(rrev: GridAxis, moment: GridAxis) -> FloatArray:
+    axes = [axis.lo + axis.step * np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1) for axis in (rrev, moment)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def _most_landed(landed: FloatArray, flown: FloatArray) -> npt.NDArray[np.intp]:
+    """The finalists: best rate among the points that reached the last stage."""
+    rate = np.where(flown == flown.max(), landed / np.maximum(flown, 1), -1.0)
+    return np.argsort(-rate, kind="stable")[:_FINALISTS]
+
+
+def _rates(
+    world: World, experiment: Experiment, theta: FloatArray, n_each: int, first_stream: int, threads: int | None
+) -> tuple[FloatArray, FloatArray]:
+    """Four-leg and clean rate of each policy, shape (m,) each, over `n_each` rollouts of the grid's random numbers."""
+    stream = first_stream + np.arange(len(theta) * n_each).reshape(len(theta), n_each)
+    outcomes = world.rollouts(
+        experiment.speed_mps,
+        experiment.angle_deg,
+        theta[:, :1],
+        theta[:, 1:],
+        seed=derive(experiment.seed, Purpose.GRID),
+        stream=stream,
+        start=experiment.start,
+        threads=threads,
+    )
+    return four_leg(outcomes).mean(axis=1), clean(outcomes).mean(axis=1)
+
+
+def _check(
+    world: World,
+    experiment: Experiment,
+    theta: FloatArray,
+    trials: npt.NDArray[np.intp],
+    episode: int,
+    threads: int | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Four-leg and clean rate of each trial's recommendation after one episode, over its fresh rollouts."""
+    n_fresh = experiment.check.n_fresh
+    seed = np.array([derive(experiment.seed + int(trial), Purpose.CHECK) for trial in trials], dtype=np.uint64)
+    outcomes = world.rollouts(
+        experiment.speed_mps,
+        experiment.angle_deg,
+        theta[:, :1],
+        theta[:, 1:],
+        seed=seed[:, None],
+        stream=episode * n_fresh + np.arange(n_fresh),
+        start=experiment.start,
+        threads=threads,
+    )
+    return four_leg(outcomes).mean(axis=1), clean(outcomes).mean(axis=1)
+
+
+def _recommendations(history: Sequence[EpisodeRow], n_episodes: int) -> FloatArray:
+    """Recommended policy after each episode, shape (n_trials, n_episodes, 2); one that stopped keeps its last."""
+    n_trials = 1 + max(row.trial for row in history)
+    theta = np.full((n_trials, n_episodes, 2), np.nan)
+    for row in history:
+        theta[row.trial, row.episode :] = row.recommended
+    return theta
+
+
+def _verdict(
+    trial: int, experiment: Experiment, episode: int, four: float, spotless: float, best: Best, rollouts: RolloutRows
+) -> Verdict:
+    solved = episode >= 0
+    n_until = (episode + 1) * experiment.n_rollouts if solved else experiment.budget
+    own = (rollouts.trial == trial) & (rollouts.status == SCORED)
+    until = own & (rollouts.episode * experiment.n_rollouts + rollouts.idx < n_until)
+    failed = ~four_leg(rollouts.outcomes)
+    return Verdict(
+        trial=trial,
+        solved=solved,
+        rollouts_to_convergence=n_until if solved else None,
+        rate_four_leg=float(four),
+        rate_clean=float(spotless),
+        failed_landings=int((failed & until).sum()),
+        failed_landings_total=int((failed & own).sum()),
+        body_contacts=int(((rollouts.outcomes["body_contact"] != 0) & until).sum()),
+        stuck=bool(four < STUCK_SHARE * best.rate_four_leg),
+    )
+
+
+def _quantile(values: Sequence[float], q: float) -> float | None:
+    value = float(np.quantile(np.asarray(values, dtype=np.float64), q, method="inverted_cdf"))
+    return value if np.isfinite(value) else None

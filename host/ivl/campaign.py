@@ -1,0 +1,232 @@
+"""A whole run from experiment to verdict: folder, learning, judging, pictures. What `ivl learn` does, as a function.
+
+result = run(load("experiments/paper_vertical.yaml"), Path("runs/mine"))
+print(result.summary["solved"], result.summary["mu"])
+"""
+
+import hashlib
+import json
+import platform
+import subprocess
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import ivl
+from ivl import assess, experiment, native, yamlfile
+from ivl.errors import StoreError
+from ivl.experiment import Experiment
+from ivl.learn import LearningRun, Progress, recent_rate
+from ivl.outcome import four_leg
+from ivl.source import WorldSource
+from ivl.store import SCHEMA_VERSION, SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest, write_json
+from ivl.world import World
+
+_MUST_MATCH = ("trials", "config_sha256", "model_sha256", "library_sha256")
+
+
+@dataclass(frozen=True)
+class Hooks:
+    """Functions that a run calls on its way; each may be left out.
+
+    Attributes:
+        on_start: Run folder, known before the first rollout.
+        on_episode: After each stored episode.
+        on_stage: Before each stage of the search for the best possible policy: (stage, number of stages).
+    """
+
+    on_start: Callable[[Path], None] | None = None
+    on_episode: Callable[[Progress], None] | None = None
+    on_stage: Callable[[int, int], None] | None = None
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A finished run.
+
+    Attributes:
+        folder: The run folder.
+        experiment: What was run.
+        world: The world it ran in.
+        best: The best possible policy there.
+        verdicts: One per trial.
+        history: Every episode of every trial.
+        rollouts: Every rollout.
+        summary: What `--json` prints.
+    """
+
+    folder: Path
+    experiment: Experiment
+    world: World
+    best: assess.Best
+    verdicts: list[assess.Verdict]
+    history: list[EpisodeRow]
+    rollouts: RolloutRows
+    summary: dict[str, Any]
+
+
+def run(
+    chosen: Experiment,
+    folder: Path,
+    n_trials: int | None = None,
+    resume: bool = False,
+    threads: int | None = None,
+    hooks: Hooks | None = None,
+) -> RunResult:
+    """Learn, judge and summarise; everything lands in `folder`.
+
+    Args:
+        chosen: The experiment.
+        folder: Run folder; must not hold a run unless `resume`.
+        n_trials: None: one run with its own summary; a number: so many seeds, summarised together.
+        resume: Continue the run in `folder` (or re-judge it, if it is complete).
+        threads: Worker threads; omitted: all processors.
+        hooks: Progress.
+
+    Raises:
+        StoreError: The folder cannot be used, or its run is of another configuration.
+        RolloutError: Flying failed; the run can be resumed.
+    """
+    hooks = hooks or Hooks()
+    world = chosen.make_world()
+    manifest = make_manifest(chosen, world, n_trials)
+    with _open(folder, chosen, manifest, resume) as store:
+        if hooks.on_start:
+            hooks.on_start(folder)
+        LearningRun(chosen, WorldSource(world, chosen, threads), store, n_trials or 1).run(hooks.on_episode)
+        history, rollouts = store.episodes(), store.rollouts()
+        best = _best(folder, world, chosen, threads, hooks)
+        verdicts = assess.judge(world, chosen, best, history, rollouts, threads)
+        summary = _summary_of_trials(verdicts) if n_trials else _summary_of_one(verdicts[0], history, rollouts)
+        summary |= {"run_dir": str(folder), "learner": chosen.learner.name, "best": asdict(best)}
+        write_json(folder / "result.json", {**summary, "verdicts": [asdict(v) for v in verdicts]})
+    return RunResult(folder, chosen, world, best, verdicts, history, rollouts, summary)
+
+
+def read_config(folder: Path) -> tuple[Experiment, int | None]:
+    """The experiment and the number of trials of an existing run folder."""
+    manifest = read_manifest(folder)
+    data = yamlfile.read(folder / "config.yaml")
+    return experiment.from_data(data, str(folder / "config.yaml")), manifest.get("trials")
+
+
+def default_folder(chosen: Experiment, n_trials: int | None, resume: bool) -> Path:
+    """A new folder under `runs/` named after the experiment; with `resume` the newest one of that name.
+
+    Raises:
+        StoreError: Nothing is there to resume.
+    """
+    base = f"{chosen.name}-{chosen.learner.name}-seed{chosen.seed}" + (f"-x{n_trials}" if n_trials else "")
+    number, existing = 1, None
+    while (candidate := Path("runs") / (base if number == 1 else f"{base}-{number}")).exists():
+        existing, number = candidate, number + 1
+    if not resume:
+        return candidate
+    if existing is None:
+        raise StoreError(f"runs/{base}: there is no run to resume; name its folder with --out")
+    return existing
+
+
+def make_manifest(chosen: Experiment, world: World, n_trials: int | None) -> dict[str, Any]:
+    """What identifies a run: hashes, versions, seed and units."""
+    library = native.library()
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "experiment": chosen.name,
+        "seed": chosen.seed,
+        "trials": n_trials,
+        "config_sha256": hashlib.sha256(chosen.to_yaml().encode()).hexdigest(),
+        "model_sha256": world.params.digest(),
+        "library_sha256": library.digest(),
+        "ivl_version": ivl.__version__,
+        "git_commit": _git_commit(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "platform": platform.platform(),
+        "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "units": {f"out_{name}": field.unit for name, field in library.outcome_fields.items()},
+        "parameters": {
+            n: {"value": _json_number(v), "from": world.params.origin[n]} for n, v in world.params.values.items()
+        },
+    }
+
+
+def _open(folder: Path, chosen: Experiment, manifest: dict[str, Any], resume: bool) -> RunStore:
+    dtype = native.library().outcome_dtype
+    if not resume or not (folder / "manifest.json").exists():
+        if resume and not folder.exists():
+            raise StoreError(f"{folder}: there is no run to resume")
+        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype)
+    old = read_manifest(folder)
+    for key in _MUST_MATCH:
+        if old.get(key) != manifest[key]:
+            raise StoreError(f"{folder}: cannot be resumed: {_difference(folder, key, old, manifest, chosen)}")
+    return RunStore.open_existing(folder, dtype)
+
+
+def _difference(folder: Path, key: str, old: dict[str, Any], new: dict[str, Any], chosen: Experiment) -> str:
+    """Which thing is not as it was when the run began."""
+    if key == "trials":
+        return f"trials: it has {old.get(key)}, now {new[key]}"
+    if key == "config_sha256":
+        then, now = yamlfile.read(folder / "config.yaml"), yamlfile.parse(chosen.to_yaml(), "experiment")
+        for field in now:
+            if then.get(field) != now[field]:
+                return f"{field}: it has {then.get(field)!r}, now {now[field]!r}"
+        return "its config.yaml was changed"
+    what = "vehicle or gear files" if key == "model_sha256" else "native library"
+    return f"the {what} changed since it began, so its rollouts would not continue bit for bit"
+
+
+def _best(folder: Path, world: World, chosen: Experiment, threads: int | None, hooks: Hooks) -> assess.Best:
+    """The best possible policy, from the run folder if it was found before."""
+    path = folder / "best.json"
+    if path.exists():
+        data = json.loads(path.read_text(encoding="utf-8"))
+        return assess.Best(**{**data, "theta": tuple(data["theta"])})
+    best = assess.find_best(world, chosen, threads, hooks.on_stage)
+    write_json(path, asdict(best))
+    return best
+
+
+def _summary_of_one(verdict: assess.Verdict, history: list[EpisodeRow], rollouts: RolloutRows) -> dict[str, Any]:
+    last = history[-1]
+    return {
+        "solved": verdict.solved,
+        "rollouts_to_convergence": verdict.rollouts_to_convergence,
+        "mu": list(last.mu),
+        "sigma": list(last.sigma),
+        "landing_rate_four_leg": _json_number(recent_rate(history)),
+        "landing_rate_clean": _json_number(recent_rate(history, clean_only=True)),
+        "failed_landings": verdict.failed_landings,
+        "recommended": list(last.recommended),
+        "recommended_rate_four_leg": verdict.rate_four_leg,
+        "recommended_rate_clean": verdict.rate_clean,
+        "failed_landings_total": verdict.failed_landings_total,
+        "body_contacts": verdict.body_contacts,
+        "stuck": verdict.stuck,
+        "rollouts": int((rollouts.status == SCORED).sum()),
+        "four_leg_landings": int((four_leg(rollouts.outcomes) & (rollouts.status == SCORED)).sum()),
+    }
+
+
+def _summary_of_trials(verdicts: list[assess.Verdict]) -> dict[str, Any]:
+    return assess.summarise(verdicts)
+
+
+def _json_number(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _git_commit() -> str | None:
+    """Commit of the source tree this package runs from; None outside of one."""
+    command = ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None

@@ -1,0 +1,49 @@
+"""The command line: `ivl learn`, `ivl rollout`, `ivl list`, `ivl bench`.
+
+Exit codes: 0 success, 1 the work failed, 2 wrong usage or configuration, 130 interrupted.
+"""
+
+import sys
+
+import typer
+
+from ivl.cli import bench, console, learn, listing, rollout
+from ivl.errors import ConfigError, IvlError, LearnerError
+
+app = typer.Typer(
+    name="ivl",
+    help="Inverted landing: learn to land a small multicopter on a ceiling.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+app.command("learn", help=learn.HELP)(learn.learn)
+app.command("rollout", help=rollout.HELP)(rollout.rollout)
+app.command("list", help=listing.HELP)(listing.list_)
+app.command("bench", help=bench.HELP)(bench.bench)
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run one command and return its exit code; errors are one line on stderr."""
+    try:
+        result = app(arguments, standalone_mode=False)
+        return int(result or 0)
+    except (ConfigError, LearnerError) as error:
+        return _fail(str(error), 2)
+    except IvlError as error:
+        return _fail(str(error), 1)
+    except typer.TyperException as error:
+        return _fail(f"{error.format_message()} (try `ivl --help`)", 2)
+    except (KeyboardInterrupt, typer.Abort):
+        return 130
+
+
+def main() -> None:
+    """Entry point of the `ivl` program."""
+    sys.exit(run())
+
+
+def _fail(message: str, code: int) -> int:
+    console.err.print(f"ivl: {message}", style="red", highlight=False, markup=False, soft_wrap=True)
+    return code

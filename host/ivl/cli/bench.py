@@ -1,0 +1,86 @@
+"""`ivl bench`."""
+
+import importlib.util
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from ivl.cli import console
+from ivl.errors import IvlError
+from ivl.world import World
+
+HELP = """Measure the simulator's speed on one core, and its ratio to the same landing in MuJoCo.
+
+Examples:
+
+  ivl bench                    rollouts and physics steps per second, ratio to MuJoCo
+
+  ivl bench --json             for a script
+
+  ivl bench --no-mujoco        without the comparison
+"""
+_MUJOCO_BENCH = Path(__file__).parents[3] / "tests" / "mujoco" / "bench.py"
+
+
+def bench(
+    n: Annotated[int, typer.Option("--rollouts", help="Rollouts to time.", min=100)] = 4000,
+    mujoco: Annotated[bool, typer.Option(help="Compare with MuJoCo.")] = True,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Measure speed; HELP is the text that people see."""
+    compare = _mujoco_rate() if mujoco else None
+    result = measure(World("habas2021", "wide_short", "as_simulated"), n)
+    result["ratio_to_mujoco"] = result["rollouts_per_s_per_core"] / compare() if compare else None
+    if as_json:
+        console.print_json(result)
+    else:
+        for name, value in result.items():
+            console.out.print(f"{name:28s} {console.number(value, 1)}", highlight=False)
+
+
+def measure(world: World, n: int) -> dict[str, Any]:
+    """Time n landings of the paper's vertical experiment, near its best policy, on one thread; best of three passes."""
+    rng = np.random.default_rng(0)
+    rrev_c_per_s, moment_y_Nmm = rng.uniform(4.5, 5.1, n), rng.uniform(7.0, 9.0, n)
+    best_s, steps = np.inf, 0
+    for _ in range(3):
+        began = time.perf_counter()
+        outcomes = world.rollouts(2.5, 90.0, rrev_c_per_s, moment_y_Nmm, threads=1)
+        best_s = min(best_s, time.perf_counter() - began)
+        steps = int(outcomes.n_steps.sum())
+    return {"rollouts_per_s_per_core": n / best_s, "steps_per_s_per_core": steps / best_s}
+
+
+def _mujoco_rate() -> Callable[[], float]:
+    """The function that times MuJoCo; it lives with the tests, since nothing else needs that engine.
+
+    Raises:
+        IvlError: This is not a source tree, or MuJoCo is not installed.
+    """
+    if not _MUJOCO_BENCH.is_file():
+        raise IvlError(
+            f"{_MUJOCO_BENCH} is missing: the comparison needs the source tree; leave it out with --no-mujoco"
+        )
+    if importlib.util.find_spec("mujoco") is None:
+        raise IvlError("mujoco is not installed: run `make setup-dev`, or leave the comparison out with --no-mujoco")
+    rate: Callable[[], float] = _load(_MUJOCO_BENCH).rollouts_per_s_per_core
+    return rate
+
+
+def _load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("ivl_mujoco_bench", path)
+    if spec is None or spec.loader is None:
+        raise IvlError(f"{path}: cannot be imported")
+    module = importlib.util.module_from_spec(spec)
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(path.parent))
+    return module

@@ -1,0 +1,47 @@
+"""What the commands print: progress and messages on stderr, results on stdout, `--json` exactly one object."""
+
+import json
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from ivl.experiment import POLICY
+from ivl.learn import Progress
+
+out = Console()
+err = Console(stderr=True)
+
+UNITS = {"rrev_c_per_s": ("RREV_c", "1/s"), "moment_y_Nmm": ("M_yd", "N mm")}
+
+
+def print_json(data: dict[str, Any]) -> None:
+    """Print one JSON object on stdout, plain text whatever the terminal."""
+    print(json.dumps(data, allow_nan=False))
+
+
+def print_episode(progress: Progress) -> None:
+    """One line of live progress: episode, mu +- sigma of both parameters, landing rate, rollouts per second."""
+    mu = np.mean([row.mu for row in progress.rows], axis=0)
+    sigma = np.mean([row.sigma for row in progress.rows], axis=0)
+    policy = "  ".join(
+        f"{UNITS[name][0]} [bold]{mu[i]:5.2f}[/] ± {sigma[i]:4.2f} {UNITS[name][1]}" for i, name in enumerate(POLICY)
+    )
+    rate = f"{100 * progress.rate_recent:3.0f} %" if np.isfinite(progress.rate_recent) else "  - "
+    trials = f"  (mean of {len(progress.rows)} trials)" if len(progress.rows) > 1 else ""
+    err.print(
+        f"episode {progress.episode:3d}/{progress.n_episodes}  {policy}  landing rate {rate}  "
+        f"{progress.rollouts_per_s:7.0f} rollouts/s{trials}",
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+def number(value: float | None, digits: int = 2) -> str:
+    """A number for people; a dash where there is none."""
+    return "-" if value is None or not np.isfinite(value) else f"{value:.{digits}f}"
+
+
+def percent(value: float | None) -> str:
+    """A share as a percentage; a dash where there is none."""
+    return "-" if value is None or not np.isfinite(value) else f"{100 * value:.1f} %"

@@ -1,0 +1,139 @@
+"""`ivl learn`."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ivl import campaign, experiment
+from ivl.cli import console
+from ivl.errors import ConfigError
+from ivl.experiment import Experiment
+
+HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
+
+EXPERIMENT is a YAML file; a name such as experiments/paper_vertical.yaml is also found inside the package.
+Everything lands in a run folder: resolved config, every rollout (run.sqlite), result.json and pictures.
+
+Examples:
+
+  ivl learn experiments/paper_vertical.yaml                     the paper's vertical landing
+
+  ivl learn experiments/paper_vertical.yaml --learner ephe      another learner (see: ivl list learners)
+
+  ivl learn experiments/paper_vertical.yaml --set gear_set=table1 --set sense.latency=0.02
+
+  ivl learn experiments/paper_vertical.yaml --trials 100 --json   how often and how fast, over 100 seeds
+
+  ivl learn --resume --out runs/mine                            go on after Ctrl-C, kill -9 or power loss
+"""
+
+
+def learn(
+    path: Annotated[str | None, typer.Argument(metavar="[EXPERIMENT]", help="YAML file of the experiment.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of learner and world.", min=0)] = None,
+    trials: Annotated[
+        int | None, typer.Option(help="Run this many seeds in lock-step: seed, seed + 1, ...", min=1, max=100_000)
+    ] = None,
+    learner: Annotated[str | None, typer.Option(help="Learner by name; see `ivl list learners`.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="A.B=C", help="Change a field of the experiment or a parameter of the world."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default: a new one under runs/.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was cut off.")] = False,
+    threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
+) -> None:
+    """Learn to land; HELP is the text that people see."""
+    chosen, n_trials = _choose(path, seed, trials, learner, settings or [], out, resume)
+    folder = out or campaign.default_folder(chosen, n_trials, resume)
+    hooks = campaign.Hooks(on_start=_announce, on_episode=console.print_episode, on_stage=_stage)
+    try:
+        result = campaign.run(chosen, folder, n_trials, resume, threads, hooks)
+    except KeyboardInterrupt:
+        console.err.print(
+            f"interrupted; continue with: ivl learn --resume --out {folder}", highlight=False, soft_wrap=True
+        )
+        raise
+    pictures = _draw(result) if n_trials is None else []
+    if as_json:
+        console.print_json(result.summary)
+    else:
+        _report(result, pictures)
+
+
+def _choose(
+    path: str | None, seed: int | None, trials: int | None, learner: str | None, settings: list[str], out: Path |
+        None, resume: bool
+) -> tuple[Experiment, int | None]:  # fmt: skip
+    """The experiment of the arguments, or the one that the folder to resume holds."""
+    if path is not None:
+        return experiment.load(path, settings, seed=seed, learner=learner), trials
+    if not (resume and out):
+        raise ConfigError(
+            "EXPERIMENT is missing (only `--resume --out FOLDER` goes without); see: ivl list experiments"
+        )
+    if settings or learner or seed is not None or trials is not None:
+        raise ConfigError(
+            "--resume without EXPERIMENT takes all from the run folder: leave out --set, --learner, --seed and --trials"
+        )
+    return campaign.read_config(out)
+
+
+def _announce(folder: Path) -> None:
+    console.err.print(f"run folder: {folder}", highlight=False, soft_wrap=True)
+
+
+def _stage(stage: int, n_stages: int) -> None:
+    console.err.print(f"judging: best possible policy, stage {stage + 1} of {n_stages} of the grid", highlight=False)
+
+
+def _draw(result: campaign.RunResult) -> list[Path]:
+    """Pictures of a single run; matplotlib is loaded only here, it takes a second."""
+    from ivl.plots import convergence, strobe
+
+    return [*convergence.draw_run(result), *strobe.draw_last_landing(result)]
+
+
+def _report(result: campaign.RunResult, pictures: list[Path]) -> None:
+    summary, best = result.summary, result.best
+    lines = _lines_of_trials(summary) if "trials" in summary else _lines_of_one(summary)
+    best_text = (
+        f"{console.percent(best.rate_four_leg)} at RREV_c {best.theta[0]:.2f} 1/s, M_yd {best.theta[1]:.2f} N mm"
+    )
+    lines.append(("best possible policy (grid)", best_text))
+    lines.append(("run folder", str(result.folder)))
+    lines.extend(("picture", str(picture)) for picture in pictures)
+    for name, text in lines:
+        console.out.print(f"{name:36s} {text}", highlight=False, soft_wrap=True)
+
+
+def _lines_of_one(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    mu, sigma = summary["mu"], summary["sigma"]
+    reached = summary["rollouts_to_convergence"]
+    return [
+        ("solved", f"yes, after {reached} rollouts" if summary["solved"] else "no"),
+        ("RREV_c", f"{mu[0]:.2f} ± {sigma[0]:.2f} 1/s"),
+        ("M_yd", f"{mu[1]:.2f} ± {sigma[1]:.2f} N mm"),
+        ("landing rate, last three episodes", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
+        ("of the recommended policy", _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"])),
+        ("failed landings until convergence", str(summary["failed_landings"])),
+        ("failed landings in all", f"{summary['failed_landings_total']} of {summary['rollouts']} rollouts"),
+    ]
+
+
+def _lines_of_trials(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    reached, failed = summary["rollouts_to_convergence"], summary["failed_landings"]
+    median, p90 = console.number(reached["median"], 0), console.number(reached["p90"], 0)
+    return [
+        ("solved", f"{summary['solved']} of {summary['trials']} trials"),
+        ("rollouts to convergence", f"median {median}, 90 % within {p90}"),
+        ("failed landings until convergence", f"median {console.number(failed['median'], 0)}"),
+        ("stuck", f"{summary['stuck_trials']} trials"),
+        ("recommended policies, mean", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
+    ]
+
+
+def _rates(four: float | None, spotless: float | None) -> str:
+    return f"{console.percent(four)} on four legs, {console.percent(spotless)} clean"

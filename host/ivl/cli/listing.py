@@ -1,0 +1,75 @@
+"""`ivl list`."""
+
+from enum import StrEnum
+from typing import Annotated, Any
+
+import typer
+
+from ivl import experiment, model
+from ivl.cli import console
+from ivl.learners import LEARNERS
+from ivl.reward import REWARDS
+
+HELP = """List what there is to choose from.
+
+Examples:
+
+  ivl list                     everything
+
+  ivl list gears --json        the landing gears, for a script
+"""
+
+
+class Kind(StrEnum):
+    """What can be listed."""
+
+    VEHICLES = "vehicles"
+    GEARS = "gears"
+    EXPERIMENTS = "experiments"
+    LEARNERS = "learners"
+    REWARDS = "rewards"
+
+
+def list_(
+    kind: Annotated[Kind | None, typer.Argument(help="What to list; all if omitted.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """List what there is to choose from; HELP is the text that people see."""
+    kinds = [kind] if kind else list(Kind)
+    found = {k.value: _entries(k) for k in kinds}
+    if as_json:
+        console.print_json(found)
+        return
+    for name, entries in found.items():
+        console.out.print(f"[bold]{name}[/]")
+        for entry in entries:
+            label = f"{entry['gear_set']}/{entry['name']}" if "gear_set" in entry else entry["name"]
+            console.out.print(f"  {label:40s} {entry['doc']}", highlight=False, soft_wrap=True)
+
+
+def _entries(kind: Kind) -> list[dict[str, Any]]:
+    if kind is Kind.VEHICLES:
+        vehicles = [model.load_vehicle(name) for name in model.list_vehicles()]
+        return [{"name": v.name, "doc": v.doc} for v in vehicles]
+    if kind is Kind.GEARS:
+        return [_gear(gear_set, name) for gear_set in model.list_gear_sets() for name in model.list_gears(gear_set)]
+    if kind is Kind.EXPERIMENTS:
+        return [{"name": path, "doc": experiment.load(path).doc} for path in experiment.list_experiments()]
+    if kind is Kind.LEARNERS:
+        return [{"name": name, "doc": entry.doc, "options": _options(name)} for name, entry in LEARNERS.items()]
+    return [{"name": name, "doc": (function.__doc__ or "").splitlines()[0]} for name, function in REWARDS.items()]
+
+
+def _gear(gear_set: str, name: str) -> dict[str, Any]:
+    gear = model.load_gear(name, gear_set)
+    quantities = {
+        key: {"value": q.value, "unit": q.unit} for key, q in gear.quantities.items() if abs(q.value) != float("inf")
+    }
+    return {"gear_set": gear_set, "name": name, "doc": gear.doc, "parameters": quantities}
+
+
+def _options(name: str) -> dict[str, Any]:
+    """Options of a learner with the defaults that this entry of the registry has."""
+    entry = LEARNERS[name]
+    defaults = {key: field.default for key, field in entry.cls.Options.model_fields.items()}
+    return {**defaults, **entry.preset}

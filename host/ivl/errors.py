@@ -1,0 +1,29 @@
+"""The one tree of exceptions of this package.
+
+Each message is one line that names the place, the value and what is allowed, so that the command line can print it as
+it is.
+"""
+
+
+class IvlError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class ConfigError(IvlError):
+    """A file, an option or an override is wrong: unknown key, bad unit, value out of range."""
+
+
+class NativeError(IvlError):
+    """The native library is missing, of another version, or refused a model."""
+
+
+class RolloutError(IvlError):
+    """A rollout could not be asked for (arguments) or could not be flown (source failed)."""
+
+
+class LearnerError(IvlError, ValueError):
+    """A learner was told something that its mathematics cannot use (also a ValueError)."""
+
+
+class StoreError(IvlError):
+    """A run folder cannot be created, read, or continued."""

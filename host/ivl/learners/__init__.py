@@ -1,0 +1,75 @@
+"""Learners by name: one registry for the command line, the experiments and the tests.
+
+A new learner is a subclass of `Learner` and one line in `LEARNERS`.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy.typing as npt
+
+from ivl.errors import LearnerError
+from ivl.learners.base import Learner, Options, Result
+from ivl.learners.bo import BOLearner
+from ivl.learners.cma_learner import CMALearner
+from ivl.learners.ephe import EPHE, RobustEPHE
+
+__all__ = [
+    "EPHE",
+    "LEARNERS",
+    "BOLearner",
+    "CMALearner",
+    "Entry",
+    "Learner",
+    "Options",
+    "Result",
+    "RobustEPHE",
+    "make_learner",
+]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One line of the registry: a class, options that differ from its defaults, and what `ivl list` says."""
+
+    cls: type[Learner]
+    doc: str
+    preset: dict[str, Any] = field(default_factory=dict)
+
+
+LEARNERS: dict[str, Entry] = {
+    "ephe": Entry(EPHE, "EPHE as published: best 3 of N, sigma about the old mean"),
+    "ephe_new": Entry(
+        EPHE, "EPHE as in its first author's slides: best 3 of N, sigma about the new mean", {"sigma_ref": "new"}
+    ),
+    "ephe_2021": Entry(
+        EPHE,
+        "EPHE as in the landing paper's simulation code: best 2 of N, old mean, eps 0.001",
+        {"n_best": 2, "eps": 0.001},
+    ),
+    "ephe_robust": Entry(RobustEPHE, "EPHE with above-mean weights and a limit on how fast sigma may shrink"),
+    "cmaes": Entry(CMALearner, "CMA-ES of the cmaes package"),
+    "cmaes_lr": Entry(CMALearner, "CMA-ES of the cmaes package with learning-rate adaptation", {"lr_adapt": True}),
+    "bo": Entry(BOLearner, "Gaussian process with Thompson sampling: fewest crashes, most computing"),
+}
+
+
+def make_learner(
+    name: str,
+    mu0: npt.ArrayLike,
+    sigma0: npt.ArrayLike,
+    *,
+    bounds: npt.ArrayLike | None = None,
+    n_rollouts: int = 8,
+    seed: int = 0,
+    **options: Any,
+) -> Learner:
+    """The learner called `name`; arguments as `Learner`, `options` on top of the entry's own.
+
+    Raises:
+        LearnerError: There is no such learner, or an argument is wrong.
+    """
+    if name not in LEARNERS:
+        raise LearnerError(f"learner: no learner {name!r} (allowed {', '.join(LEARNERS)})")
+    entry = LEARNERS[name]
+    return entry.cls(mu0, sigma0, bounds=bounds, n_rollouts=n_rollouts, seed=seed, **{**entry.preset, **options})

@@ -1,0 +1,236 @@
+"""The native simulator, loaded with ctypes; every name, unit, range and offset comes from the library's own tables.
+
+Nothing about a structure is typed here a second time: `ivl_sil_table()` describes each record field by field, and
+numpy dtypes are built from that. The calls release the interpreter lock while they run.
+"""
+
+import ctypes
+import hashlib
+import os
+import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ivl.errors import NativeError
+
+ABI_VERSION = 1
+LIBRARY_ENV = "IVL_NATIVE_LIBRARY"  # another build of the library, for example one with sanitizers
+DEFAULT_LIBRARY = Path(__file__).parent / "_native" / "libivl_sil.so"
+
+TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED = range(5)
+_ERROR_BYTES = 256
+_FIELD_TYPES = {"f8": 8, "f4": 4, "i4": 4, "u4": 4, "u8": 8, "i8": 8, "i1": 1, "u1": 1}
+
+
+@dataclass(frozen=True)
+class Field:
+    """One line of a table of the library.
+
+    Attributes:
+        name: Field name; dotted for parameters ("body.mass").
+        type: numpy type code of one element.
+        offset: Bytes from the start of the record.
+        count: Number of elements (1: scalar).
+        unit: Unit of the stored value, "1" if dimensionless.
+        lo: Smallest allowed value.
+        hi: Largest allowed value.
+        default: Value if not given, None if it must be given.
+        doc: One line of documentation.
+    """
+
+    name: str
+    type: str
+    offset: int
+    count: int
+    unit: str
+    lo: float
+    hi: float
+    default: float | None
+    doc: str
+
+
+class _CField(ctypes.Structure):
+    _fields_ = [
+        ("name", ctypes.c_char_p),
+        ("type", ctypes.c_char_p),
+        ("offset", ctypes.c_uint32),
+        ("count", ctypes.c_uint32),
+        ("unit", ctypes.c_char_p),
+        ("lo", ctypes.c_double),
+        ("hi", ctypes.c_double),
+        ("dflt", ctypes.c_double),
+        ("doc", ctypes.c_char_p),
+    ]
+
+
+class NativeLibrary:
+    """One loaded library: its tables as `Field`s and numpy dtypes, and its calls as methods."""
+
+    def __init__(self, path: Path) -> None:
+        """Load the library at `path`.
+
+        Raises:
+            NativeError: The file is missing, cannot be loaded, or speaks another version of the interface.
+        """
+        if not path.is_file():
+            raise NativeError(f"{path}: the native library is missing: run `make build`")
+        try:
+            self._c = ctypes.CDLL(str(path))
+            _declare(self._c)
+        except (OSError, AttributeError) as error:
+            raise NativeError(f"{path}: cannot be loaded ({error}): run `make build`") from error
+        version = int(self._c.ivl_sil_abi_version())
+        if version != ABI_VERSION:
+            raise NativeError(
+                f"{path}: interface version {version}, this package needs {ABI_VERSION}: run `make build`"
+            )
+        self.path = path
+        self.params: Mapping[str, Field] = {f.name: f for f in self._fields(TABLE_PARAM)[0]}
+        self.spec_fields, self.spec_dtype = self._table(TABLE_SPEC)
+        self.outcome_fields, self.outcome_dtype = self._table(TABLE_OUTCOME)
+        self.trace_fields, self.trace_dtype = self._table(TABLE_TRACE)
+        self.derived_fields, self.derived_dtype = self._table(TABLE_DERIVED)
+
+    def _fields(self, table: int) -> tuple[tuple[Field, ...], int]:
+        n_fields, item_size = ctypes.c_uint32(), ctypes.c_uint32()
+        rows = self._c.ivl_sil_table(table, ctypes.byref(n_fields), ctypes.byref(item_size))
+        if not rows:
+            raise NativeError(f"{self.path}: table {table} is missing")
+        return tuple(_field(rows[i]) for i in range(n_fields.value)), item_size.value
+
+    def _table(self, table: int) -> tuple[Mapping[str, Field], np.dtype[np.void]]:
+        fields, item_size = self._fields(table)
+        return {f.name: f for f in fields}, _dtype(fields, item_size)
+
+    def digest(self) -> str:
+        """SHA-256 of the library file: two runs are only comparable bit for bit if it is the same."""
+        return hashlib.sha256(self.path.read_bytes()).hexdigest()
+
+    def create_model(self, values: npt.NDArray[np.float64]) -> "NativeModel":
+        """Build a native model from the parameter vector (order of `params`)."""
+        return NativeModel(self, values)
+
+    def end_reason(self, code: int) -> str:
+        """Name of an outcome's `end_reason`."""
+        return bytes(self._c.ivl_sil_end_reason(code)).decode()
+
+    def phase_name(self, code: int) -> str:
+        """Name of a trace row's `phase`."""
+        return bytes(self._c.ivl_sil_phase_name(code)).decode()
+
+
+class NativeModel:
+    """A vehicle and a gear inside the library; immutable, may be used from several threads at once."""
+
+    def __init__(self, library: NativeLibrary, values: npt.NDArray[np.float64]) -> None:
+        """Create the model; the library frees it with this object.
+
+        Raises:
+            NativeError: The library refused the parameters; its message says which.
+        """
+        if values.shape != (len(library.params),):
+            raise NativeError(
+                f"the parameter vector has shape {values.shape}, the library needs ({len(library.params)},)"
+            )
+        vector = np.ascontiguousarray(values, dtype=np.float64)
+        message = ctypes.create_string_buffer(_ERROR_BYTES)
+        handle = library._c.ivl_sil_model_create(_pointer(vector), message, _ERROR_BYTES)
+        if not handle:
+            raise NativeError(message.value.decode())
+        self._library = library
+        self._handle = ctypes.c_void_p(handle)
+        weakref.finalize(self, library._c.ivl_sil_model_free, self._handle)
+
+    def derived(self) -> npt.NDArray[np.void]:
+        """Quantities that the library derives once from the parameters, one record of `derived_dtype`."""
+        record = np.zeros(1, dtype=self._library.derived_dtype)
+        self._library._c.ivl_sil_model_derived(self._handle, _pointer(record))
+        return record
+
+    def rollouts(self, specs: npt.NDArray[np.void], n_threads: int) -> npt.NDArray[np.void]:
+        """Fly `specs` (1-D, `spec_dtype`); returns the outcomes in the same order, same bits for any `n_threads`."""
+        outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
+        status = self._library._c.ivl_sil_rollouts(
+            self._handle, _pointer(specs), specs.size, n_threads, _pointer(outcomes)
+        )
+        if status != 0:
+            raise NativeError(f"the native batch of {specs.size} rollouts failed with status {status}")
+        return outcomes
+
+    def trace(self, spec: npt.NDArray[np.void], period_s: float) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
+        """Fly one spec and record it every `period_s`; returns (rows, outcome of shape (1,))."""
+        outcome = np.zeros(1, dtype=self._library.outcome_dtype)
+        rows = np.zeros(1024, dtype=self._library.trace_dtype)
+        for _ in range(2):
+            n_rows = self._trace_into(spec, period_s, rows, outcome)
+            if n_rows <= rows.size:
+                return rows[:n_rows].copy(), outcome
+            rows = np.zeros(n_rows, dtype=self._library.trace_dtype)
+        raise NativeError(f"the trace needs {n_rows} rows after {rows.size} had been promised")
+
+    def _trace_into(
+        self, spec: npt.NDArray[np.void], period_s: float, rows: npt.NDArray[np.void], outcome: npt.NDArray[np.void]
+    ) -> int:
+        call = self._library._c.ivl_sil_trace
+        n_rows = int(call(self._handle, _pointer(spec), period_s, _pointer(rows), rows.size, _pointer(outcome)))
+        if n_rows < 0:
+            raise NativeError(f"the native trace failed with status {n_rows}")
+        return n_rows
+
+
+@cache
+def library() -> NativeLibrary:
+    """The library of this process, loaded on first use."""
+    return NativeLibrary(Path(os.environ.get(LIBRARY_ENV, DEFAULT_LIBRARY)))
+
+
+def _declare(c: Any) -> None:
+    u32p = ctypes.POINTER(ctypes.c_uint32)
+    ptr, size, c_int, double = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_double
+    for name, restype, argtypes in (
+        ("ivl_sil_table", ctypes.POINTER(_CField), (c_int, u32p, u32p)),
+        ("ivl_sil_abi_version", c_int, ()),
+        ("ivl_sil_model_create", ptr, (ptr, ctypes.c_char_p, size)),
+        ("ivl_sil_model_free", None, (ptr,)),
+        ("ivl_sil_model_derived", None, (ptr, ptr)),
+        ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
+        ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
+        ("ivl_sil_end_reason", ctypes.c_char_p, (c_int,)),
+        ("ivl_sil_phase_name", ctypes.c_char_p, (c_int,)),
+    ):
+        function = getattr(c, name)
+        function.restype, function.argtypes = restype, list(argtypes)
+
+
+def _field(row: _CField) -> Field:
+    code = row.type.decode()
+    if code not in _FIELD_TYPES:
+        raise NativeError(f"the library's field {row.name.decode()} has the unknown type {code!r}")
+    default = None if np.isnan(row.dflt) else float(row.dflt)
+    return Field(
+        row.name.decode(), code, row.offset, row.count, row.unit.decode(), row.lo, row.hi, default, row.doc.decode()
+    )
+
+
+def _dtype(fields: tuple[Field, ...], item_size: int) -> np.dtype[np.void]:
+    for f in fields:
+        if f.offset + f.count * _FIELD_TYPES[f.type] > item_size:
+            raise NativeError(f"the library's field {f.name} ends beyond its record of {item_size} bytes")
+    return np.dtype(
+        {
+            "names": [f.name for f in fields],
+            "formats": [f.type if f.count == 1 else (f.type, (f.count,)) for f in fields],
+            "offsets": [f.offset for f in fields],
+            "itemsize": item_size,
+        }
+    )
+
+
+def _pointer(array: npt.NDArray[Any]) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)

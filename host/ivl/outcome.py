@@ -1,0 +1,46 @@
+"""What a rollout's outcome means: the project's definitions of success, on whole record arrays.
+
+`four_leg` is the paper's landing (its reward pools three and four legs); `clean` is that without body or rotor contact.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FOUR_LEG_MIN = 3
+
+BoolArray = npt.NDArray[np.bool_]
+Outcomes = npt.NDArray[np.void]
+"""Record array of the library's outcome table, any shape."""
+
+
+def four_leg(outcomes: Outcomes) -> BoolArray:
+    """True where at least three feet are stuck at the end."""
+    return np.asarray(outcomes["n_legs"] >= FOUR_LEG_MIN)
+
+
+def clean(outcomes: Outcomes) -> BoolArray:
+    """True where at least three feet are stuck and neither body nor rotor touched the ceiling."""
+    return np.asarray(four_leg(outcomes) & (outcomes["body_contact"] == 0))
+
+
+def folded_deg(angle_deg: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """An unwrapped angle as its magnitude in 0 .. 180 degrees; NaN stays NaN."""
+    turned = np.mod(np.abs(np.asarray(angle_deg, dtype=np.float64)), 360.0)
+    return np.minimum(turned, 360.0 - turned)
+
+
+def as_dict(outcome: Any, end_reason: str) -> dict[str, Any]:
+    """One outcome record as plain data for JSON: NaN becomes None, `end_reason` its name."""
+    result: dict[str, Any] = {}
+    for name in outcome.dtype.names:
+        value = outcome[name]
+        if isinstance(value, np.ndarray):
+            result[name] = value.tolist()
+        elif isinstance(value, np.floating):
+            result[name] = float(value) if np.isfinite(value) else None
+        else:
+            result[name] = int(value)
+    result["end_reason"] = end_reason
+    return result

@@ -1,0 +1,112 @@
+"""Convergence of a run in the manner of the paper's Fig. 4: mu +- 2 sigma of both parameters, and the landing rate."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+
+from ivl.campaign import RunResult
+from ivl.experiment import POLICY, Experiment
+from ivl.learn import RECENT_EPISODES
+from ivl.outcome import clean, four_leg
+from ivl.plots import style
+from ivl.store import SCORED, EpisodeRow, RolloutRows
+
+LABELS = {"rrev_c_per_s": "RREV$_c$ (1/s)", "moment_y_Nmm": "$M_{yd}$ (N mm)"}
+OUTCOMES = (
+    ("four legs, clean", style.GREEN, "o"),
+    ("four legs, body contact", style.SKY, "s"),
+    ("one or two legs", style.ORANGE, "^"),
+    ("no leg", style.VERMILION, "x"),
+)
+
+
+def draw_run(result: RunResult) -> list[Path]:
+    """Draw trial 0 of a finished run into its folder, as PNG and SVG."""
+    paths = [result.folder / f"convergence{suffix}" for suffix in (".png", ".svg")]
+    return draw(
+        result.experiment, result.history, result.rollouts, paths, result.summary.get("rollouts_to_convergence")
+    )
+
+
+def draw(
+    experiment: Experiment,
+    history: Sequence[EpisodeRow],
+    rollouts: RolloutRows,
+    paths: Sequence[Path],
+    converged_at: int | None = None,
+) -> list[Path]:
+    """Draw one trial.
+
+    Args:
+        experiment: What was run: start of the search and bounds.
+        history: Episodes of the trial, in order.
+        rollouts: Rollouts of the trial.
+        paths: Files to write.
+        converged_at: Rollouts to convergence; drawn as a line unless None.
+    """
+    figure = style.new_figure(6.5, 6.5)
+    axes = figure.subplots(3, 1, sharex=True, height_ratios=(3, 3, 2))
+    for i, name in enumerate(POLICY):
+        _draw_parameter(axes[i], experiment, history, rollouts, i)
+        axes[i].set_ylabel(LABELS[name])
+    _draw_rate(axes[2], experiment, history)
+    axes[2].set_xlabel("rollout")
+    if converged_at is not None:
+        for axis in axes:
+            axis.axvline(converged_at, color=style.GREY, linewidth=1, linestyle=":")
+        axes[2].annotate(f" solved after {converged_at}", (converged_at, 0.03), color=style.GREY, fontsize=8)
+    axes[0].set_title(
+        f"{experiment.name}: {experiment.gear_set}/{experiment.gear}, {experiment.speed_mps:g} m/s at "
+        f"{experiment.angle_deg:g}°, {experiment.learner.name}, seed {experiment.seed}",
+        fontsize=9,
+    )
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
+    return style.save(figure, paths)
+
+
+def _draw_parameter(
+    axis: Axes, experiment: Experiment, history: Sequence[EpisodeRow], rollouts: RolloutRows, i: int
+) -> None:
+    """One dot per rollout in the colour of its outcome, over the search distribution that it was drawn from."""
+    parameter = getattr(experiment.policy, POLICY[i])
+    mu = np.array([parameter.mu0] + [row.mu[i] for row in history])
+    sigma = np.array([parameter.sigma0] + [row.sigma[i] for row in history])
+    at = experiment.n_rollouts * np.arange(len(mu))
+    axis.fill_between(
+        at, mu - 2 * sigma, mu + 2 * sigma, step="post", color=style.BLUE, alpha=0.15, linewidth=0, label="µ ± 2σ"
+    )
+    axis.step(at, mu, where="post", color=style.BLUE, linewidth=1.2, label="µ")
+    number = rollouts.episode * experiment.n_rollouts + rollouts.idx + 0.5
+    for (label, color, marker), chosen in zip(OUTCOMES, outcome_classes(rollouts), strict=True):
+        axis.scatter(
+            number[chosen], rollouts.theta[chosen, i], s=12, color=color, marker=marker, linewidths=1, label=label
+        )
+    axis.set_ylim(*_limits(parameter.bounds, rollouts.theta[:, i]))
+
+
+def _draw_rate(axis: Axes, experiment: Experiment, history: Sequence[EpisodeRow]) -> None:
+    rates = np.array([row.rate_four_leg for row in history])
+    recent = [np.nanmean(rates[max(0, k + 1 - RECENT_EPISODES) : k + 1]) for k in range(len(rates))]
+    at = experiment.n_rollouts * (np.arange(len(rates)) + 1)
+    axis.bar(at - experiment.n_rollouts / 2, rates, width=0.85 * experiment.n_rollouts, color=style.GREEN, alpha=0.35)
+    axis.plot(at, recent, color=style.BLUE, linewidth=1.2)
+    axis.set_ylim(0, 1.05)
+    axis.set_ylabel("four-leg landing rate\n(bars: episode, line: last three)", fontsize=8)
+
+
+def outcome_classes(rollouts: RolloutRows) -> list[npt.NDArray[np.bool_]]:
+    """Masks of the scored rollouts in the order of `OUTCOMES`."""
+    scored = rollouts.status == SCORED
+    four, spotless = four_leg(rollouts.outcomes), clean(rollouts.outcomes)
+    some = (rollouts.outcomes["n_legs"] > 0) & ~four
+    none = rollouts.outcomes["n_legs"] == 0
+    return [np.asarray(mask & scored) for mask in (spotless, four & ~spotless, some, none)]
+
+
+def _limits(bounds: Sequence[float], values: npt.NDArray[np.float64]) -> tuple[float, float]:
+    lo, hi = min(bounds[0], values.min()), max(bounds[1], values.max())
+    margin = 0.03 * (hi - lo)
+    return float(lo - margin), float(hi + margin)

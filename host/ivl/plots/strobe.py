@@ -1,0 +1,159 @@
+"""A landing as a strobe picture: side view (x-z) of body, legs, propellers and ceiling at equal time steps.
+
+Left the approach and the flip, until touch-down; right the touch-down and the swing, enlarged and with finer steps.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from ivl.campaign import RunResult
+from ivl.outcome import four_leg
+from ivl.plots import style
+from ivl.seeds import Purpose, derive
+from ivl.store import SCORED
+from ivl.world import Trace, World
+
+N_GHOSTS = 8
+_BEFORE_TRIGGER_S, _SWING_S = 0.03, 0.14
+# legs 1 front-right, 2 rear-right, 3 rear-left, 4 front-left
+_LEG_SIGNS = np.array([[1, -1], [-1, -1], [-1, 1], [1, 1]])
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def draw_last_landing(result: RunResult) -> list[Path]:
+    """Fly the last four-leg landing of a run (or its last rollout) again and draw it into the run's folder."""
+    scored = np.flatnonzero(result.rollouts.status == SCORED)
+    landed = scored[four_leg(result.rollouts.outcomes[scored])]
+    row = int(landed[-1] if landed.size else scored[-1])
+    chosen, theta = result.experiment, result.rollouts.theta[row]
+    trace = result.world.trace(
+        chosen.speed_mps,
+        chosen.angle_deg,
+        float(theta[0]),
+        float(theta[1]),
+        seed=derive(chosen.seed + int(result.rollouts.trial[row]), Purpose.WORLD),
+        stream=int(result.rollouts.stream[row]),
+        start=chosen.start,
+        period_s=0.001,
+    )
+    return draw(result.world, trace, [result.folder / f"last_landing{suffix}" for suffix in (".png", ".svg")])
+
+
+def draw(world: World, trace: Trace, paths: Sequence[Path]) -> list[Path]:
+    """Draw one landing; trigger and touch-down in colours of their own, the ghosts coloured by time.
+
+    Args:
+        world: Gives the shapes.
+        trace: The landing.
+        paths: Files to write.
+    """
+    figure = style.new_figure(7.5, 5.0)
+    left, right = figure.subplots(1, 2)
+    first_s, touch_s, last_s = _window(trace)
+    _draw_panel(figure, left, world, trace, first_s, touch_s, "approach and flip")
+    _draw_panel(figure, right, world, trace, touch_s, last_s, "touch-down and swing")
+    left.set_ylabel("z above the ceiling's surface (m)")
+    figure.suptitle(_title(world, trace), fontsize=style.NORMAL)
+    for label, time_s, color in _events(trace):
+        left.plot([], [], color=color, linewidth=2.2, label=f"{label}, t = {time_s:.3f} s")
+    if _events(trace):
+        figure.legend(loc="outside lower center", ncols=2, fontsize=style.SMALL, frameon=False)
+    return style.save(figure, paths)
+
+
+def _draw_panel(
+    figure: Figure, axis: Axes, world: World, trace: Trace, first_s: float, last_s: float, title: str
+) -> None:
+    """Ghosts at equal steps from `first_s` to `last_s`, and the events that lie between."""
+    rows, color_map, scale = trace.rows, mpl.colormaps["viridis"], Normalize(first_s, last_s)
+    times = np.linspace(first_s, last_s, N_GHOSTS)
+    for time_s in times:
+        _draw_vehicle(axis, world, _row_at(rows, time_s), color_map(scale(time_s)), 1.0)
+    for _, time_s, color in _events(trace):
+        if first_s <= time_s <= last_s:
+            _draw_vehicle(axis, world, _row_at(rows, time_s), color, 2.0)
+    path = (rows.t_s >= first_s) & (rows.t_s <= last_s)
+    axis.plot(*_side(world, rows.p_WB_m[path]).T, color=style.GREY, linewidth=0.6, linestyle="--", zorder=0)
+    axis.axhline(0.0, color="black", linewidth=1.5)
+    bar = figure.colorbar(ScalarMappable(scale, color_map), ax=axis, location="bottom", shrink=0.8)
+    bar.set_label(f"time (s), a ghost every {1000 * (times[1] - times[0]):.0f} ms", fontsize=style.SMALL)
+    bar.ax.tick_params(labelsize=style.SMALL)
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.set_xlabel("x (m)")
+    axis.set_title(title, fontsize=style.NORMAL)
+    style.finish(axis)
+
+
+def _window(trace: Trace) -> tuple[float, float, float]:
+    """Start of the picture, touch-down (closest approach if there was none), and end."""
+    rows, outcome = trace.rows, trace.outcome
+    touch_s = float(outcome.t_impact_s)
+    if not np.isfinite(touch_s):
+        touch_s = float(rows.t_s[int(np.argmin(rows.d_ceil_m))])
+    trigger_s = float(outcome.t_trigger_s) if np.isfinite(outcome.t_trigger_s) else touch_s - 0.2
+    first_s = max(0.0, min(trigger_s - _BEFORE_TRIGGER_S, touch_s - _BEFORE_TRIGGER_S))
+    return first_s, touch_s, touch_s + _SWING_S
+
+
+def _events(trace: Trace) -> list[tuple[str, float, str]]:
+    outcome = trace.outcome
+    found = (("trigger", outcome.t_trigger_s, style.VERMILION), ("touch-down", outcome.t_impact_s, style.PURPLE))
+    return [(label, float(time_s), color) for label, time_s, color in found if np.isfinite(time_s)]
+
+
+def _row_at(rows: Any, time_s: float) -> Any:
+    return rows[min(int(np.searchsorted(rows.t_s, time_s)), len(rows) - 1)]
+
+
+def _draw_vehicle(axis: Axes, world: World, row: Any, color: Any, width: float) -> None:
+    """Propeller plate thick, base plate thinner, the post between them, and four legs from hip to foot."""
+    values, to_world = world.params.values, _rotation(row.q_WB)
+    top, bottom = values["prop_plate.center_z"], values["base_plate.center_z"]
+    shapes_B = (
+        ([[-values["prop_plate.size_x"] / 2, 0, top], [values["prop_plate.size_x"] / 2, 0, top]], 2.0),
+        ([[-values["base_plate.size_x"] / 2, 0, bottom], [values["base_plate.size_x"] / 2, 0, bottom]], 1.2),
+        ([[0, 0, bottom], [0, 0, top]], 1.2),
+    )
+    for points_B, line_width in shapes_B:
+        points = _side(world, row.p_WB_m + np.array(points_B) @ to_world.T)
+        axis.plot(*points.T, color=color, linewidth=line_width * width, solid_capstyle="round")
+    feet = row.foot_W_m.reshape(4, 3)
+    hips_B = np.column_stack([values["leg.hip_xy"] * _LEG_SIGNS, np.full(4, values["leg.hip_z"])])
+    for leg in np.stack([row.p_WB_m + hips_B @ to_world.T, feet], axis=1):
+        axis.plot(*_side(world, leg).T, color=color, linewidth=0.8 * width)
+    side = _side(world, feet)
+    axis.scatter(side[:, 0], side[:, 1], s=5 * width, color=[color], zorder=3)
+
+
+def _side(world: World, points_W_m: FloatArray) -> FloatArray:
+    """Horizontal place, and height above the ceiling's surface, shape (n, 2)."""
+    height_m = world.params.values["world.ceiling_height"]
+    return np.column_stack([points_W_m[..., 0], points_W_m[..., 2] - height_m])
+
+
+def _rotation(q: FloatArray) -> FloatArray:
+    """Rotation matrix body to world of the unit quaternion x, y, z, w."""
+    x, y, z, w = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _title(world: World, trace: Trace) -> str:
+    outcome = trace.outcome
+    contact = ", body contact" if outcome.body_contact else ""
+    return f"{world.vehicle}, {world.gear_set}/{world.gear}: {outcome.n_legs} feet stuck{contact}"

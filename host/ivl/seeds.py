@@ -1,0 +1,20 @@
+"""Independent seeds for independent purposes, all from the one seed of a run."""
+
+from enum import IntEnum
+
+import numpy as np
+
+
+class Purpose(IntEnum):
+    """What a derived seed is for; the numbers are part of every stored result and never change."""
+
+    WORLD = 1
+    LEARNER = 2
+    CHECK = 3
+    GRID = 4
+
+
+def derive(seed: int, purpose: Purpose) -> int:
+    """A seed in 0 .. 2^63 - 1 (what SQLite's integers hold) for one purpose."""
+    words = np.random.SeedSequence([seed, int(purpose)]).generate_state(1, np.uint64)
+    return int(words[0] >> np.uint64(1))

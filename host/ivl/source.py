@@ -1,0 +1,77 @@
+"""Where rollouts come from: the loop asks a `RolloutSource` and does not know whether it simulates or flies."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ivl.experiment import Experiment
+from ivl.outcome import Outcomes
+from ivl.world import World
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Rollouts to fly, one per row.
+
+    Attributes:
+        theta: Policies (RREV_c in 1/s, M_yd in N mm), shape (n, 2).
+        seed: Seed of the random numbers of each rollout's trial, shape (n,).
+        stream: Number of each rollout within its trial, shape (n,).
+    """
+
+    theta: npt.NDArray[np.float64]
+    seed: npt.NDArray[np.uint64]
+    stream: npt.NDArray[np.uint64]
+
+
+@dataclass(frozen=True)
+class Flown:
+    """Some rollouts of a plan that are over.
+
+    Attributes:
+        index: Rows of the plan, shape (m,).
+        outcomes: Outcome records, shape (m,).
+        discarded: Why these rollouts must not be scored; empty if they are to be scored.
+    """
+
+    index: npt.NDArray[np.intp]
+    outcomes: Outcomes
+    discarded: str = ""
+
+
+class RolloutSource(Protocol):
+    """Flies plans. Results may come in any order and in any portions; each portion is stored as soon as it comes."""
+
+    def fly(self, plan: Plan) -> Iterator[Flown]:
+        """Fly every row of the plan once.
+
+        Raises:
+            RolloutError: The source cannot go on; what was yielded before stays valid.
+        """
+        ...
+
+
+class WorldSource:
+    """The simulator in this process: a whole plan in one native batch."""
+
+    def __init__(self, world: World, experiment: Experiment, threads: int | None = None) -> None:
+        """Fly the experiment's approach in `world`."""
+        self.world, self._experiment, self._threads = world, experiment, threads
+
+    def fly(self, plan: Plan) -> Iterator[Flown]:
+        """Fly the plan; one portion with everything."""
+        experiment = self._experiment
+        outcomes = self.world.rollouts(
+            experiment.speed_mps,
+            experiment.angle_deg,
+            plan.theta[:, 0],
+            plan.theta[:, 1],
+            seed=plan.seed,
+            stream=plan.stream,
+            start=experiment.start,
+            threads=self._threads,
+        )
+        yield Flown(np.arange(len(plan.theta)), outcomes)

@@ -1,0 +1,424 @@
+"""The run folder: everything a run did, safe against `kill -9` and power loss at any moment.
+
+    config.yaml     the resolved experiment
+    manifest.json   schema version, seed, trials, hashes of model and library, versions, units
+    run.sqlite      rollouts, episodes and learner states
+
+SQLite in WAL mode with synchronous=FULL: a commit is on the disk when it returns, and a transaction is there whole or
+not at all. An episode passes three commits: *planned* (policies and the learners' states after `ask`), *scored* (each
+portion of outcomes as it comes), *told* (episode rows and the learners' states after `tell`). What is between two
+commits is repeated on resume with the same random numbers, so a continued run equals an uninterrupted one bit for
+bit. SQLite stores float64 exactly; NaN is stored as NULL.
+"""
+
+import fcntl
+import json
+import os
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ivl.errors import StoreError
+from ivl.outcome import Outcomes
+from ivl.reward import Reward
+
+SCHEMA_VERSION = 1
+PLANNED, SCORED, DISCARDED = "planned", "scored", "discarded"
+
+_ROLLOUT_KEY = "trial INTEGER, episode INTEGER, idx INTEGER"
+_REWARD_COLUMNS = ("reward", "reward_distance", "reward_angle", "reward_legs")
+_EPISODE_COLUMNS = (
+    "n_scored",
+    "mu_rrev_c_per_s",
+    "mu_moment_y_Nmm",
+    "sigma_rrev_c_per_s",
+    "sigma_moment_y_Nmm",
+    "recommended_rrev_c_per_s",
+    "recommended_moment_y_Nmm",
+    "reward_mean",
+    "rate_four_leg",
+    "rate_clean",
+    "stopped",
+)
+
+
+@dataclass(frozen=True)
+class RolloutRows:
+    """Rollouts of one or more trials as read back, in the order (trial, episode, idx).
+
+    Attributes:
+        trial: Trial of each rollout, shape (n,).
+        episode: Episode within the trial, shape (n,).
+        idx: Place within the episode, shape (n,).
+        stream: Random stream, shape (n,).
+        status: "planned", "scored" or "discarded", shape (n,).
+        theta: Policies, shape (n, 2).
+        reward: Return, shape (n,), NaN if not scored.
+        outcomes: Outcome records, shape (n,); zero if not scored.
+    """
+
+    trial: npt.NDArray[np.int64]
+    episode: npt.NDArray[np.int64]
+    idx: npt.NDArray[np.int64]
+    stream: npt.NDArray[np.uint64]
+    status: npt.NDArray[np.str_]
+    theta: npt.NDArray[np.float64]
+    reward: npt.NDArray[np.float64]
+    outcomes: Outcomes
+
+    def __len__(self) -> int:
+        """Number of rollouts."""
+        return len(self.trial)
+
+
+@dataclass(frozen=True)
+class EpisodeRow:
+    """What is kept of one finished episode of one trial; arrays have one element per policy parameter."""
+
+    trial: int
+    episode: int
+    n_scored: int
+    mu: tuple[float, ...]
+    sigma: tuple[float, ...]
+    recommended: tuple[float, ...]
+    reward_mean: float
+    rate_four_leg: float
+    rate_clean: float
+    stopped: bool
+
+
+class RunStore:
+    """One run folder, open for writing by this process alone."""
+
+    def __init__(self, folder: Path, outcome_dtype: np.dtype[np.void], lock: int) -> None:
+        """Use `create` or `open_existing`; `lock` is the descriptor that keeps the folder."""
+        self.folder = folder
+        self._outcome_dtype = outcome_dtype
+        self._outcome_columns = _outcome_columns(outcome_dtype)
+        self._lock = lock
+        try:
+            self._db = sqlite3.connect(folder / "run.sqlite", isolation_level=None, timeout=10.0)
+            self._db.execute("PRAGMA journal_mode=WAL")
+            self._db.execute("PRAGMA synchronous=FULL")
+        except sqlite3.Error as error:
+            os.close(lock)
+            raise StoreError(f"{folder / 'run.sqlite'}: {error}") from error
+
+    @classmethod
+    def create(
+        cls, folder: Path, config_yaml: str, manifest: Mapping[str, Any], outcome_dtype: np.dtype[np.void]
+    ) -> "RunStore":
+        """Make a new run folder.
+
+        The manifest is written last: a folder without one is a creation that was cut off, and is started over.
+
+        Raises:
+            StoreError: The folder holds a run already, holds something else, or cannot be written.
+        """
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = _lock(folder)
+            try:
+                _clear_unfinished(folder)
+            except BaseException:
+                os.close(lock)
+                raise
+            store = cls(folder, outcome_dtype, lock)
+            with store._transaction():
+                store._create_tables()
+            _write_durably(folder / "config.yaml", config_yaml)
+            write_json(folder / "manifest.json", manifest)
+        except OSError as error:
+            raise StoreError(f"{folder}: cannot be written: {error}") from error
+        return store
+
+    @classmethod
+    def open_existing(cls, folder: Path, outcome_dtype: np.dtype[np.void]) -> "RunStore":
+        """Open a run folder to continue or read it.
+
+        Raises:
+            StoreError: There is no run, it is of another schema version, or another process has it open.
+        """
+        manifest = read_manifest(folder)
+        if manifest.get("schema_version") != SCHEMA_VERSION:
+            version = manifest.get("schema_version")
+            raise StoreError(f"{folder}: schema version {version!r}, this program reads {SCHEMA_VERSION}")
+        store = cls(folder, outcome_dtype, _lock(folder))
+        known = [row[1] for row in store._db.execute("PRAGMA table_info(rollout)")]
+        if not known or [c for c in known if c.startswith("out_")] != list(store._outcome_columns):
+            store.close()
+            raise StoreError(f"{folder}: run.sqlite has other columns than the outcomes of this version")
+        return store
+
+    def close(self) -> None:
+        """Close the database and release the folder."""
+        self._db.close()
+        os.close(self._lock)
+
+    def __enter__(self) -> "RunStore":
+        """The store itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close."""
+        self.close()
+
+    def plan(
+        self, episode: int, trials: Sequence[int], stream: npt.NDArray[np.uint64], theta:
+        Sequence[npt.NDArray[np.float64]],
+        states: Sequence[Mapping[str, Any]],
+    ) -> None:  # fmt: skip
+        """Commit the policies of one episode, before any is flown, with the learners' states after `ask`.
+
+        Args:
+            episode: Number of the episode.
+            trials: Trials that take part.
+            stream: Random stream of each rollout, shape (n_rollouts,), the same in every trial.
+            theta: For each trial the policies, shape (n_rollouts, 2).
+            states: For each trial the learner's state.
+        """
+        rows = [
+            (trial, episode, idx, int(stream[idx]), PLANNED, float(policy[0]), float(policy[1]))
+            for trial, policies in zip(trials, theta, strict=True)
+            for idx, policy in enumerate(policies)
+        ]
+        insert = (
+            "INSERT INTO rollout(trial, episode, idx, stream, status, rrev_c_per_s, moment_y_Nmm) VALUES(?,?,?,?,?,?,?)"
+        )
+        with self._transaction():
+            self._db.executemany(insert, rows)
+            self._save_states(trials, states)
+
+    def score(
+        self, keys: Sequence[tuple[int, int, int]], outcomes: Outcomes, reward: Reward, discarded: str = ""
+    ) -> None:
+        """Commit the outcomes of some planned rollouts.
+
+        Args:
+            keys: (trial, episode, idx) of each.
+            outcomes: Outcome records, shape (n,).
+            reward: Terms, each of shape (n,).
+            discarded: Reason why they must not count; empty if they do.
+        """
+        names = ("status", "discarded", *_REWARD_COLUMNS, *self._outcome_columns)
+        update = (
+            f"UPDATE rollout SET {', '.join(f'{name}=?' for name in names)} "
+            f"WHERE trial=? AND episode=? AND idx=? AND status='{PLANNED}'"
+        )
+        status = DISCARDED if discarded else SCORED
+        terms = np.stack([reward.total, reward.distance, reward.angle, reward.legs], axis=1)
+        rows = [
+            (status, discarded, *map(_to_sql, terms[i].tolist()), *self._flatten(outcomes[i]), *key)
+            for i, key in enumerate(keys)
+        ]
+        with self._transaction():
+            changed = self._db.executemany(update, rows).rowcount
+            if changed != len(rows):
+                raise StoreError(
+                    f"{self.folder}: {len(rows) - changed} of {len(rows)} scored rollouts were not planned"
+                )
+
+    def finish_episode(self, rows: Sequence[EpisodeRow], states: Sequence[Mapping[str, Any]]) -> None:
+        """Commit one episode of some trials: its figures and the learners' states after `tell`, in one transaction."""
+        marks = ",".join("?" * (2 + len(_EPISODE_COLUMNS)))
+        values = [
+            (r.trial, r.episode, r.n_scored, *r.mu, *r.sigma, *r.recommended,
+             *map(_to_sql, (r.reward_mean, r.rate_four_leg, r.rate_clean)), int(r.stopped))
+            for r in rows
+        ]  # fmt: skip
+        with self._transaction():
+            self._db.executemany(f"INSERT INTO episode VALUES({marks})", values)
+            self._save_states([r.trial for r in rows], states)
+
+    def learner_states(self) -> dict[int, dict[str, Any]]:
+        """The last saved state of each trial's learner."""
+        return {trial: json.loads(text) for trial, text in self._db.execute("SELECT trial, state FROM learner")}
+
+    def episodes(self) -> list[EpisodeRow]:
+        """All finished episodes, ordered by (trial, episode)."""
+        query = f"SELECT trial, episode, {', '.join(_EPISODE_COLUMNS)} FROM episode ORDER BY trial, episode"
+        return [_episode_row(row) for row in self._db.execute(query)]
+
+    def rollouts(self, trial: int | None = None, episode: int | None = None) -> RolloutRows:
+        """Rollouts of one trial or all, of one episode or all."""
+        names = ("trial", "episode", "idx", "stream", "status", "rrev_c_per_s", "moment_y_Nmm", "reward")
+        query = f"SELECT {', '.join((*names, *self._outcome_columns))} FROM rollout"
+        wanted = {"trial": trial, "episode": episode}
+        given = {name: value for name, value in wanted.items() if value is not None}
+        if given:
+            query += " WHERE " + " AND ".join(f"{name}=?" for name in given)
+        rows = self._db.execute(query + " ORDER BY trial, episode, idx", tuple(given.values())).fetchall()
+        return self._rollout_rows(rows, len(names))
+
+    def _rollout_rows(self, rows: list[tuple[Any, ...]], n_names: int) -> RolloutRows:
+        outcomes = np.zeros(len(rows), dtype=self._outcome_dtype)
+        for i, row in enumerate(rows):
+            if row[4] != PLANNED:
+                self._unflatten(row[n_names:], outcomes[i : i + 1])
+        column = list(zip(*rows, strict=True)) or [()] * n_names
+        return RolloutRows(
+            trial=np.array(column[0], dtype=np.int64),
+            episode=np.array(column[1], dtype=np.int64),
+            idx=np.array(column[2], dtype=np.int64),
+            stream=np.array(column[3], dtype=np.uint64),
+            status=np.array(column[4], dtype=np.str_),
+            theta=np.array([column[5], column[6]], dtype=np.float64).T.copy(),
+            reward=np.array([_from_sql(x) for x in column[7]], dtype=np.float64),
+            outcomes=outcomes.view(np.recarray),
+        )
+
+    def _create_tables(self) -> None:
+        outcome = ", ".join(f"{name} {kind}" for name, kind in self._outcome_columns.items())
+        rewards = ", ".join(f"{name} REAL" for name in _REWARD_COLUMNS)
+        figures = ", ".join(
+            f"{name} {'INTEGER' if name in ('n_scored', 'stopped') else 'REAL'}" for name in _EPISODE_COLUMNS
+        )
+        self._db.execute(
+            f"CREATE TABLE rollout({_ROLLOUT_KEY}, stream INTEGER NOT NULL, status TEXT NOT NULL, discarded TEXT, "
+            f"rrev_c_per_s REAL NOT NULL, moment_y_Nmm REAL NOT NULL, {rewards}, {outcome}, "
+            "PRIMARY KEY(trial, episode, idx)) WITHOUT ROWID"
+        )
+        self._db.execute(
+            f"CREATE TABLE episode(trial INTEGER, episode INTEGER, {figures}, PRIMARY KEY(trial, episode))"
+        )
+        self._db.execute("CREATE TABLE learner(trial INTEGER PRIMARY KEY, state TEXT NOT NULL)")
+
+    def _save_states(self, trials: Sequence[int], states: Sequence[Mapping[str, Any]]) -> None:
+        rows = [(trial, json.dumps(state, allow_nan=False)) for trial, state in zip(trials, states, strict=True)]
+        self._db.executemany("INSERT OR REPLACE INTO learner(trial, state) VALUES(?,?)", rows)
+
+    def _flatten(self, outcome: Any) -> list[Any]:
+        values: list[Any] = []
+        for name in self._outcome_dtype.names or ():
+            item = outcome[name].tolist()
+            values.extend(item if isinstance(item, list) else [item])
+        return [_to_sql(value) for value in values]
+
+    def _unflatten(self, values: Sequence[Any], target: npt.NDArray[np.void]) -> None:
+        at = 0
+        for name in self._outcome_dtype.names or ():
+            count = int(np.prod(self._outcome_dtype[name].shape, dtype=np.int64))
+            part = [_from_sql(value) for value in values[at : at + count]]
+            target[name][0] = part if self._outcome_dtype[name].shape else part[0]
+            at += count
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        self._db.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._db.execute("ROLLBACK")
+            raise
+        self._db.execute("COMMIT")
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The manifest of a run folder.
+
+    Raises:
+        StoreError: There is no run, or its manifest cannot be read.
+    """
+    path = folder / "manifest.json"
+    if not path.is_file():
+        raise StoreError(f"{folder}: holds no run (no manifest.json)")
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path}: cannot be read: {error}") from error
+    if not isinstance(manifest, dict):
+        raise StoreError(f"{path}: expected an object")
+    return manifest
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write JSON so that the file is there whole or not at all."""
+    _write_durably(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
+
+
+def _outcome_columns(dtype: np.dtype[np.void]) -> dict[str, str]:
+    """SQL column name -> type for each element of each outcome field."""
+    columns = {}
+    for name in dtype.names or ():
+        field = dtype[name]
+        kind = "REAL" if field.base.kind == "f" else "INTEGER"
+        count = int(np.prod(field.shape, dtype=np.int64))
+        names = [f"out_{name}"] if not field.shape else [f"out_{name}_{i + 1}" for i in range(count)]
+        columns.update(dict.fromkeys(names, kind))
+    return columns
+
+
+def _to_sql(value: Any) -> Any:
+    return None if isinstance(value, float) and np.isnan(value) else value
+
+
+def _from_sql(value: Any) -> Any:
+    return np.nan if value is None else value
+
+
+def _episode_row(row: tuple[Any, ...]) -> EpisodeRow:
+    trial, episode, n_scored, *rest = row
+    reward_mean, rate_four_leg, rate_clean = (_from_sql(value) for value in rest[6:9])
+    return EpisodeRow(
+        trial=trial,
+        episode=episode,
+        n_scored=n_scored,
+        mu=(rest[0], rest[1]),
+        sigma=(rest[2], rest[3]),
+        recommended=(rest[4], rest[5]),
+        reward_mean=reward_mean,
+        rate_four_leg=rate_four_leg,
+        rate_clean=rate_clean,
+        stopped=bool(rest[9]),
+    )
+
+
+def _lock(folder: Path) -> int:
+    """Keep other processes out; the kernel releases the lock whatever ends this one."""
+    descriptor = os.open(folder / "lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(descriptor)
+        raise StoreError(f"{folder}: another process is working on this run") from error
+    return descriptor
+
+
+def _clear_unfinished(folder: Path) -> None:
+    """Remove what a creation that was cut off left behind; anything else in the folder is not ours to touch."""
+    ours = {
+        "run.sqlite",
+        "run.sqlite-wal",
+        "run.sqlite-shm",
+        "config.yaml",
+        "config.yaml.part",
+        "manifest.json.part",
+        "lock",
+    }
+    if (folder / "manifest.json").exists():
+        raise StoreError(f"{folder}: holds a run already: continue it with --resume, or choose another --out")
+    foreign = sorted(path.name for path in folder.iterdir() if path.name not in ours)
+    if foreign:
+        raise StoreError(f"{folder}: is not empty ({foreign[0]} ...) and holds no run: choose another --out")
+    for name in ours - {"lock"}:
+        (folder / name).unlink(missing_ok=True)
+
+
+def _write_durably(path: Path, text: str) -> None:
+    part = path.with_name(path.name + ".part")
+    with part.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    part.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)

@@ -1,0 +1,228 @@
+"""The simulated world: one vehicle with one landing gear, and batches of rollouts in it.
+
+    world = ivl.World(vehicle="habas2021", gear="wide_long", gear_set="as_simulated", **{"sense.latency": 0.01})
+    out = world.rollouts(2.5, 90.0, rrev_c_per_s=np.linspace(3, 6, 100), moment_y_Nmm=8.0)
+    print((out.n_legs >= 3).mean())
+
+A rollout is a pure function of the world, its arguments, `seed` and `stream`: the same bits alone or among a million,
+on one thread or many.
+"""
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ivl import model, native
+from ivl.errors import NativeError, RolloutError
+
+START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2}
+_BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within seconds
+_SEED_MAX = 2**64 - 1
+_THREADS_MAX = 256
+
+FloatLike = npt.ArrayLike
+
+
+@dataclass(frozen=True)
+class Trace:
+    """The time series of one rollout.
+
+    Attributes:
+        rows: Record array of the library's trace table, shape (n_rows,): time, pose, velocities, thrusts, feet,
+            phase, cues.
+        outcome: The rollout's outcome record, equal to what `World.rollouts` returns for the same arguments.
+    """
+
+    rows: np.recarray[Any, Any]
+    outcome: np.record
+
+
+class World:
+    """One vehicle with one landing gear under a ceiling. Immutable, may be shared by threads, can be pickled."""
+
+    def __init__(
+        self,
+        vehicle: str = "habas2021",
+        gear: str = "wide_short",
+        gear_set: str = model.DEFAULT_GEAR_SET,
+        **overrides: float,
+    ) -> None:
+        """Read, check and assemble the files and build the native model.
+
+        Args:
+            vehicle: Name of a shipped vehicle, or a path to a YAML file.
+            gear: Name of a design in the gear set.
+            gear_set: Name of a shipped gear set, or a path to a YAML file.
+            **overrides: Parameter values by dotted name, in the unit of the parameter table.
+
+        Raises:
+            ConfigError: A file or an override is wrong.
+            NativeError: The library is missing or refuses the combination of values.
+        """
+        self.vehicle, self.gear, self.gear_set = vehicle, gear, gear_set
+        self.overrides = dict(overrides)
+        self._build(model.assemble((model.load_vehicle(vehicle), model.load_gear(gear, gear_set)), overrides))
+
+    def _build(self, params: model.Parameters) -> None:
+        self.params = params
+        self._library = native.library()
+        try:
+            self._native = self._library.create_model(params.vector())
+        except NativeError as error:
+            raise NativeError(f"vehicle {self.vehicle}, gear {self.gear_set}/{self.gear}: {error}") from error
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What pickling carries: the checked parameters, never the files' names alone nor the native handle."""
+        names = ("vehicle", "gear", "gear_set", "overrides", "params")
+        return {name: getattr(self, name) for name in names}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Rebuild the native model from the pickled parameters."""
+        self.__dict__.update(state)
+        self._build(state["params"])
+
+    def __repr__(self) -> str:
+        """The call that makes this world."""
+        extra = "".join(f", {name}={value!r}" for name, value in self.overrides.items())
+        return f"World(vehicle={self.vehicle!r}, gear={self.gear!r}, gear_set={self.gear_set!r}{extra})"
+
+    def derived(self) -> dict[str, Any]:
+        """Values that the library derives once from the parameters (mass with legs, inertia, mixer ...), by name."""
+        record = self._native.derived()[0]
+        return {name: record[name].tolist() for name in self._library.derived_dtype.names or ()}
+
+    def end_reason(self, code: int) -> str:
+        """Name of an outcome's `end_reason`."""
+        return self._library.end_reason(int(code))
+
+    def phase_name(self, code: int) -> str:
+        """Name of a trace row's `phase`."""
+        return self._library.phase_name(int(code))
+
+    def rollouts(
+        self,
+        speed_mps: FloatLike,
+        angle_deg: FloatLike,
+        rrev_c_per_s: FloatLike,
+        moment_y_Nmm: FloatLike,
+        seed: npt.ArrayLike = 0,
+        start: str = "imparted",
+        d_ceil_m: FloatLike | None = None,
+        threads: int | None = None,
+        stream: npt.ArrayLike | None = None,
+    ) -> np.recarray[Any, Any]:
+        """Fly one rollout for each element of the broadcast of the arguments.
+
+        Args:
+            speed_mps: Approach speed, m/s.
+            angle_deg: Approach angle above the horizontal, degrees.
+            rrev_c_per_s: Trigger threshold RREV_c, 1/s.
+            moment_y_Nmm: Magnitude of the nose-up body moment M_yd, N mm.
+            seed: Seed of the random numbers, 0 .. 2^64 - 1.
+            start: "imparted" (at the approach velocity), "flown" (from hover) or "at_trigger" (moment commanded at
+                once).
+            d_ceil_m: Distance to the ceiling at the start, m; for "at_trigger" alone, which needs it.
+            threads: Worker threads; omitted: all processors.
+            stream: Number of the rollout within its seed; omitted: the flat index in this call.
+
+        Returns:
+            Record array of outcomes in the shape of the broadcast; fields of the library's outcome table.
+
+        Raises:
+            RolloutError: An argument is not finite, out of range, or does not broadcast.
+        """
+        specs, shape = self._specs(
+            start, stream, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
+            moment_y_Nmm=moment_y_Nmm, d_ceil_m=d_ceil_m, seed=seed,
+        )  # fmt: skip
+        n_threads = _check_threads(threads)
+        outcomes = np.empty(specs.shape, dtype=self._library.outcome_dtype)
+        for first in range(0, specs.size, _BATCH_ROLLOUTS):
+            part = slice(first, first + _BATCH_ROLLOUTS)
+            outcomes[part] = self._native.rollouts(specs[part], n_threads)
+        return outcomes.reshape(shape).view(np.recarray)
+
+    def trace(
+        self,
+        speed_mps: float,
+        angle_deg: float,
+        rrev_c_per_s: float,
+        moment_y_Nmm: float,
+        seed: int = 0,
+        start: str = "imparted",
+        d_ceil_m: float | None = None,
+        stream: int = 0,
+        period_s: float = 0.002,
+    ) -> Trace:
+        """Fly one rollout and record it every `period_s` seconds (arguments and errors as `rollouts`, scalars only)."""
+        specs, shape = self._specs(
+            start, stream, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
+            moment_y_Nmm=moment_y_Nmm, d_ceil_m=d_ceil_m, seed=seed,
+        )  # fmt: skip
+        if shape != ():
+            raise RolloutError(f"trace: the arguments must be scalars, they broadcast to {shape}")
+        if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
+            raise RolloutError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
+        rows, outcome = self._native.trace(specs, period_s)
+        return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
+
+    def _specs(
+        self, start: str, stream: npt.ArrayLike | None, **arguments: npt.ArrayLike | None
+    ) -> tuple[npt.NDArray[np.void], tuple[int, ...]]:
+        """Checked, broadcast and flattened rollout specifications, and the shape they had."""
+        if start not in START_CODES:
+            raise RolloutError(f"start: value {start!r} is unknown (allowed {', '.join(START_CODES)})")
+        if (start == "at_trigger") != (arguments["d_ceil_m"] is not None):
+            raise RolloutError(
+                f"d_ceil_m: value {arguments['d_ceil_m']!r}: start='at_trigger' needs it, others must not have it"
+            )
+        given = {name: _numbers(name, value) for name, value in arguments.items() if value is not None}
+        if stream is not None:
+            given["stream"] = _numbers("stream", stream)
+        try:
+            shape = np.broadcast_shapes(*(array.shape for array in given.values()))
+        except ValueError as error:
+            shapes = ", ".join(f"{name} {array.shape}" for name, array in given.items() if array.shape)
+            raise RolloutError(f"the arguments do not broadcast: {shapes}") from error
+        specs = np.zeros(int(np.prod(shape, dtype=np.int64)), dtype=self._library.spec_dtype)
+        specs["start"] = START_CODES[start]
+        specs["d_ceil_m"] = self._library.spec_fields["d_ceil_m"].default
+        specs["stream"] = np.arange(specs.size, dtype=np.uint64)
+        for name, array in given.items():
+            self._check_range(name, array)
+            specs[name] = np.broadcast_to(array, shape).ravel()
+        return specs, shape
+
+    def _check_range(self, name: str, array: npt.NDArray[Any]) -> None:
+        if array.dtype == np.uint64:
+            return
+        field = self._library.spec_fields[name]
+        good = np.isfinite(array) & (array >= field.lo) & (array <= field.hi)
+        if not good.all():
+            value = float(array[~good].flat[0])
+            raise RolloutError(
+                f"{name}: value {value!r} is out of range (allowed {field.lo:g} .. {field.hi:g} {field.unit})"
+            )
+
+
+def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
+    """The argument as a float64 array, seeds and streams as uint64."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.dtype == np.longdouble:
+        raise RolloutError(f"{name}: value {value!r} is not a number or an array of numbers")
+    if name not in ("seed", "stream"):
+        return array.astype(np.float64)
+    if array.dtype.kind == "f" or (array.size and int(array.min()) < 0):
+        raise RolloutError(f"{name}: value {value!r} must be a whole number (allowed 0 .. {_SEED_MAX})")
+    return array.astype(np.uint64)
+
+
+def _check_threads(threads: int | None) -> int:
+    if threads is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= _THREADS_MAX:
+        raise RolloutError(f"threads: value {threads!r} is out of range (allowed 1 .. {_THREADS_MAX})")
+    return threads

@@ -1,0 +1,89 @@
+"""Strict reading of YAML: no duplicate keys, and one line of text for whatever pydantic finds wrong.
+
+PyYAML reads `1e-6` as text and `1.0e-6` as a number. Text where a number belongs is refused, with that hint, never
+converted.
+"""
+
+import re
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from ivl.errors import ConfigError
+
+Model = TypeVar("Model", bound=BaseModel)
+_NUMBER_AS_TEXT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+class _StrictLoader(yaml.SafeLoader):
+    """SafeLoader that refuses a key given twice in one mapping (plain YAML keeps the last one silently)."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen: set[Any] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is given twice", key_node.start_mark)
+            seen.add(key)
+        return super().construct_mapping(node, deep=deep)
+
+
+def parse(text: str, label: str) -> Any:
+    """Parse YAML text; `label` names it in errors."""
+    try:
+        return yaml.load(text, Loader=_StrictLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise ConfigError(f"{label}: {where}{error.problem}") from error
+    except (yaml.YAMLError, TypeError) as error:
+        raise ConfigError(f"{label}: not YAML: {' '.join(str(error).split())}") from error
+
+
+def read(path: Path) -> Any:
+    """Read and parse a YAML file."""
+    try:
+        return parse(path.read_text(encoding="utf-8"), path.name)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read: {error}") from error
+
+
+def dump(data: Any) -> str:
+    """YAML text of plain data, keys in the given order, floats so that they read back as the same number."""
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+
+
+def validate(model: type[Model], data: Any, label: str) -> Model:
+    """Check `data` against `model`; all that is wrong comes out as one line that starts with `label`."""
+    if not isinstance(data, dict):
+        raise ConfigError(f"{label}: expected a mapping of fields, got {type(data).__name__}")
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise ConfigError(f"{label}: {explain(error)}") from error
+
+
+def explain(error: ValidationError) -> str:
+    """The first problem as `field: value ...: what is wrong`, with the number of further ones."""
+    problems = error.errors(include_url=False)
+    first = problems[0]
+    field = ".".join(str(part) for part in first["loc"]) or "file"
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return f"{field}: {_complaint(first['type'], first['msg'], first['input'])}{more}"
+
+
+def number_hint(value: Any) -> str:
+    """Advice for a number that YAML took as text; empty for anything else."""
+    if isinstance(value, str) and _NUMBER_AS_TEXT.fullmatch(value.strip()):
+        return "; YAML reads this as text: write numbers as 1.0e-6, with a point and a signed exponent"
+    return ""
+
+
+def _complaint(kind: str, message: str, value: Any) -> str:
+    if kind == "missing":
+        return "is missing"
+    if kind == "extra_forbidden":
+        return f"unknown key (value {value!r})"
+    return f"value {value!r}: {message}{number_hint(value)}"
