@@ -4,7 +4,7 @@
 ivl_ceiling_t ivl_ceiling_compute(const ivl_cfg_t *cfg, const ivl_sense_t *sense)
 {
     const float d_ceil_m = cfg->h_ceil_m - sense->sample.p_WB_m.z;
-    if (sense->fresh && (d_ceil_m >= cfg->d_ceil_m_min) && (d_ceil_m <= cfg->d_ceil_m_max))
+    if (sense->pose_fresh && (d_ceil_m >= cfg->d_ceil_m_min) && (d_ceil_m <= cfg->d_ceil_m_max))
     {
         return (ivl_ceiling_t){
             .d_ceil_m = d_ceil_m,

@@ -21,10 +21,16 @@ static bool elapsed(const ivl_state_t *state, float limit_s)
     return (float)state->n_phase_tick * state->derived.dt_s >= limit_s;
 }
 
+// state and command are this tick's
+static bool fresh(const ivl_state_t *state)
+{
+    return state->sense.pose_fresh && state->sense.cmd_fresh;
+}
+
 // a good, recent sample of a vehicle that is not tipped over
 static bool flyable(const ivl_state_t *state)
 {
-    return state->sense.usable && (state->sense.up_z >= state->derived.cos_tilt_abort);
+    return state->sense.pose_usable && (state->sense.up_z >= state->derived.cos_tilt_abort);
 }
 
 static bool trigger_fires(const ivl_state_t *state, ivl_cues_t cues);
@@ -52,19 +58,19 @@ CONDITION(may_arm)
 {
     UNUSED(cfg), UNUSED(cues);
     const bool wanted = requested(state, IVL_REQUEST_HOVER) || (requested(state, IVL_REQUEST_APPROACH) && !state->triggered);
-    return wanted && state->derived.cfg_good && state->sense.fresh && flyable(state);
+    return wanted && state->derived.cfg_good && fresh(state) && flyable(state);
 }
 
 CONDITION(may_approach)
 {
     UNUSED(cues);
-    return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && state->sense.fresh && elapsed(state, cfg->ready_s_min);
+    return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && fresh(state) && elapsed(state, cfg->ready_s_min);
 }
 
-CONDITION(unflyable)
+CONDITION(unfit)
 {
     UNUSED(cfg), UNUSED(cues);
-    return !flyable(state);
+    return !(flyable(state) && state->sense.cmd_usable);
 }
 
 CONDITION(triggered)
@@ -91,10 +97,10 @@ CONDITION(hanging)
     return state->contact.hanging;
 }
 
-CONDITION(sense_lost)
+CONDITION(inputs_lost)
 {
     UNUSED(cfg), UNUSED(cues);
-    return !state->sense.usable;
+    return !(state->sense.pose_usable && state->sense.cmd_usable);
 }
 
 CONDITION(inverted)
@@ -146,12 +152,12 @@ static const row_t ROWS[] = {
     [IVL_PHASE_READY] = {"ready", IVL_DRIVE_HOVER, false,
         {{request_idle,      IVL_PHASE_IDLE},
          {request_abort,     IVL_PHASE_ABORTED},
-         {unflyable,         IVL_PHASE_ABORTED},
+         {unfit,             IVL_PHASE_ABORTED},
          {may_approach,      IVL_PHASE_APPROACH}}},
     [IVL_PHASE_APPROACH] = {"approach", IVL_DRIVE_APPROACH, true,
         {{request_idle,      IVL_PHASE_IDLE},
          {request_abort,     IVL_PHASE_ABORTED},
-         {unflyable,         IVL_PHASE_ABORTED},
+         {unfit,             IVL_PHASE_ABORTED},
          {request_hover,     IVL_PHASE_READY},
          {triggered,         IVL_PHASE_FLIP},
          {approach_too_long, IVL_PHASE_ABORTED}}},
@@ -159,7 +165,7 @@ static const row_t ROWS[] = {
         {{request_idle,      IVL_PHASE_IDLE},
          {contact,           IVL_PHASE_ATTACHED},
          {request_abort,     IVL_PHASE_COAST},
-         {sense_lost,        IVL_PHASE_COAST},
+         {inputs_lost,       IVL_PHASE_COAST},
          {inverted,          IVL_PHASE_COAST},
          {flip_too_long,     IVL_PHASE_COAST}}},
     [IVL_PHASE_COAST] = {"coast", IVL_DRIVE_OFF, false,
@@ -184,7 +190,8 @@ _Static_assert(IVL_PHASE_COAST == 4 && IVL_PHASE_ATTACHED == 5 && IVL_PHASE_DONE
 
 static bool trigger_fires(const ivl_state_t *state, ivl_cues_t cues)
 {
-    return ROWS[state->phase].trigger_live && state->has_policy && !state->triggered && ivl_trigger_due(&state->policy, cues);
+    return ROWS[state->phase].trigger_live && state->has_policy && !state->triggered && fresh(state) &&
+           ivl_trigger_due(&state->policy, cues);
 }
 
 // ---- what happens on the way into a phase

@@ -13,6 +13,7 @@ void ivl_sense_reset(ivl_sense_t *sense)
     memset(sense, 0, sizeof *sense);
     sense->sample.q_WB.w = 1.0f;
     sense->age_s = AGE_S_NEVER;
+    sense->cmd_age_s = AGE_S_NEVER;
     // one before zero, so that a clock may start at zero
     sense->t_last_us = UINT64_MAX;
 }
@@ -71,21 +72,16 @@ static void accept(ivl_sense_t *sense, const ivl_in_t *in, float q_norm2, float 
     sense->age_s = age_s;
 }
 
-ivl_sense_fault_t ivl_sense_update(const ivl_cfg_t *cfg, ivl_sense_t *sense, const ivl_in_t *in, float dt_s)
+void ivl_sense_update(const ivl_cfg_t *cfg, ivl_sense_t *sense, const ivl_in_t *in, float dt_s)
 {
     const ivl_quat_t q = in->q_WB;
     const float      q_norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
     const float      age_s = pose_age_s(cfg, sense, in);
-    const bool       is_command = command_good(cfg, &in->cmd);
-    const bool       is_pose = (age_s >= 0.0f) && pose_good(in, q_norm2);
+    sense->pose_fresh = (age_s >= 0.0f) && pose_good(in, q_norm2);
+    sense->cmd_fresh = command_good(cfg, &in->cmd);
 
-    // the request is obeyed on its own; the state only together with a good command
-    if (is_command)
-    {
-        sense->cmd = in->cmd;
-    }
-    sense->fresh = is_command && is_pose;
-    if (sense->fresh)
+    // what is good is taken, what is not lets its predecessor age
+    if (sense->pose_fresh)
     {
         accept(sense, in, q_norm2, age_s);
     }
@@ -93,7 +89,12 @@ ivl_sense_fault_t ivl_sense_update(const ivl_cfg_t *cfg, ivl_sense_t *sense, con
     {
         sense->age_s += dt_s;
     }
-    sense->usable = sense->age_s <= cfg->stale_s_max;
+    if (sense->cmd_fresh)
+    {
+        sense->cmd = in->cmd;
+    }
+    sense->cmd_age_s = sense->cmd_fresh ? 0.0f : sense->cmd_age_s + dt_s;
+    sense->pose_usable = sense->age_s <= cfg->stale_s_max;
+    sense->cmd_usable = sense->cmd_age_s <= cfg->stale_s_max;
     sense->t_last_us = in->t_us;
-    return (ivl_sense_fault_t){.bad_pose = !is_pose, .bad_command = !is_command};
 }

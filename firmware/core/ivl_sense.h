@@ -1,5 +1,5 @@
 /// @file ivl_sense.h
-/// Stage 1: the sensed state and the command, checked.  A tick's input is taken as a whole or not at all.
+/// Stage 1: the sensed state and the command, checked.  Each is taken as a whole or not at all; the last good one is kept.
 #ifndef IVL_SENSE_H
 #define IVL_SENSE_H
 #include "ivl_cfg.h"
@@ -26,26 +26,23 @@ typedef struct
 
 typedef struct
 {
-    ivl_sample_t  sample;     ///< the last good sample, its quaternion normalised
-    ivl_command_t cmd;        ///< the last good command
-    float         age_s;      ///< age of the sample's position; grows by one tick per tick without a good input
-    float         up_z;       ///< z component in W of b_z: cosine of the tilt
-    uint64_t      t_last_us;  ///< clock of the previous tick
-    bool          fresh;      ///< this tick's input was good as a whole
-    bool          usable;     ///< a good sample exists and is not older than stale_s_max
+    ivl_sample_t  sample;       ///< the last good sensed state, its quaternion normalised
+    ivl_command_t cmd;          ///< the last good command
+    float         age_s;        ///< age of the sample's position; grows by one tick per tick without a good one
+    float         up_z;         ///< z component in W of b_z: cosine of the tilt
+    uint64_t      t_last_us;    ///< clock of the previous tick
+    float         cmd_age_s;    ///< time since the last good command
+    bool          pose_fresh;   ///< the sample is this tick's
+    bool          pose_usable;  ///< the sample is not older than stale_s_max
+    bool          cmd_fresh;    ///< the command is this tick's
+    bool          cmd_usable;   ///< the command is not older than stale_s_max
 } ivl_sense_t;
-
-/// What was refused in one tick.
-typedef struct
-{
-    bool bad_pose;
-    bool bad_command;
-} ivl_sense_fault_t;
 
 /// No sample, request IDLE.
 void ivl_sense_reset(ivl_sense_t *sense);
 
-/// Take in one tick.  A good request is obeyed even if the sensed state is bad (an abort must always arrive).
+/// Take in one tick.  State and command are independent: an abort arrives even if the sensed state is bad, and the vehicle is kept
+/// level even if the command is.
 /// @param[in] dt_s  tick period, s
-ivl_sense_fault_t ivl_sense_update(const ivl_cfg_t *cfg, ivl_sense_t *sense, const ivl_in_t *in, float dt_s);
+void ivl_sense_update(const ivl_cfg_t *cfg, ivl_sense_t *sense, const ivl_in_t *in, float dt_s);
 #endif  // IVL_SENSE_H

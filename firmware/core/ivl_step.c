@@ -21,10 +21,10 @@ void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state)
     }
 }
 
-static void count_faults(ivl_diag_t *diag, ivl_sense_fault_t fault)
+static void count_faults(ivl_diag_t *diag, const ivl_sense_t *sense)
 {
-    diag->n_bad_pose += fault.bad_pose ? 1u : 0u;
-    diag->n_bad_command += fault.bad_command ? 1u : 0u;
+    diag->n_bad_pose += sense->pose_fresh ? 0u : 1u;
+    diag->n_bad_command += sense->cmd_fresh ? 0u : 1u;
 }
 
 // all motors off
@@ -76,7 +76,8 @@ void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_
     }
 
     // sensed state -> contact, ceiling -> cues -> phase (the trigger is one of its conditions)
-    count_faults(&state->diag, ivl_sense_update(cfg, &state->sense, in, state->derived.dt_s));
+    ivl_sense_update(cfg, &state->sense, in, state->derived.dt_s);
+    count_faults(&state->diag, &state->sense);
     ivl_contact_update(cfg, &state->contact, &state->sense, state->derived.dt_s);
     if (!ivl_motors_latched_off(state))
     {

@@ -2,15 +2,6 @@
 /// The parameter table and the check of a configuration, row by row; the log table's paths.
 #include "test_ivl_support.h"
 
-void setUp(void);
-void tearDown(void);
-void setUp(void)
-{
-}
-void tearDown(void)
-{
-}
-
 typedef struct
 {
     const char *type, *group, *name, *unit, *doc;

@@ -2,15 +2,6 @@
 /// Accuracy of the own functions against libm in double precision, and rotation matrices against their definition.
 #include "test_ivl_support.h"
 
-void setUp(void);
-void tearDown(void);
-void setUp(void)
-{
-}
-void tearDown(void)
-{
-}
-
 static void test_sincos_is_within_its_stated_error_when_the_argument_is_in_range(void)
 {
     double worst = 0.0;

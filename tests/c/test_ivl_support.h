@@ -211,7 +211,13 @@ static inline float *spoil_float(ivl_in_t *in, uint32_t i)
     return fields[i];
 }
 
-/// Spoil one field so that the input as a whole is not acceptable, whatever the request (kinds 0 .. SPOIL_COUNT - 1).
+/// True if spoil() of this kind makes the command unacceptable, false if it is the sensed state.
+static inline bool spoils_command(uint32_t kind)
+{
+    return kind >= SPOIL_FLOATS * SPOIL_VALUES + 4;
+}
+
+/// Spoil one field so that sensed state or command is not acceptable, whatever the request (kinds 0 .. SPOIL_COUNT - 1).
 static inline void spoil(ivl_in_t *in, uint32_t kind)
 {
     const float values[SPOIL_VALUES] = {NAN, -NAN, INFINITY, -INFINITY, FLT_MAX, -FLT_MAX, 1.0e9f};
