@@ -1,5 +1,5 @@
 /// @file ivl_controller.h
-/// Stage 5c: geometric tracking controller on SE(3) (Lee, Leok, McClamroch 2010), heading 0, no integral terms, desired rate 0.
+/// Stage 5c: geometric tracking controller on SE(3) (Lee, Leok, McClamroch 2010), heading 0, no integral terms, with the desired rate.
 #ifndef IVL_CONTROLLER_H
 #define IVL_CONTROLLER_H
 #include "ivl_approach.h"
