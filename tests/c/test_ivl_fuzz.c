@@ -1,0 +1,286 @@
+/// @file test_ivl_fuzz.c
+/// Seeded random flights: valid and garbage inputs mixed, requests and policies at random, over all phases.
+/// After every tick: outputs finite and in range, motors off where they must be, at most one trigger per arm cycle and only on an input
+/// that is good by this file's own judgement, the snapshot unchanged until the next cycle, and no motor on inputs that have been bad for long.
+#include "test_ivl_support.h"
+
+#define N_FLIGHTS 6000
+#define N_TICKS   500
+
+typedef struct
+{
+    rng_t          rng;
+    fix_t          fix;
+    float          garbage_norm;  // share of spoiled inputs in this flight
+    float          stay_norm;     // chance per tick that a burst of spoiled inputs goes on
+    bool           in_burst;
+    uint32_t       burst_kind;
+    uint32_t       n_trigger_cycle;  // triggers since the last arming
+    uint32_t       n_bad_pose_run;   // ticks in a row whose pose was bad
+    uint64_t       t_last_us;
+    bool           was_latched_off;
+    ivl_phase_t    last_phase;
+    ivl_snapshot_t snapshot;
+} flight_t;
+
+static uint64_t n_ticks_in[IVL_PHASE_COUNT];
+static uint64_t n_triggers, n_spoiled, n_cycles;
+
+// ---- this file's own judgement of an input, from the stated ranges
+
+static bool number_in(float x, float limit)
+{
+    return isfinite(x) && (x >= -limit) && (x <= limit);
+}
+
+static bool pose_is_good(const ivl_in_t *in, const ivl_cfg_t *cfg, uint64_t t_last_us)
+{
+    const float limits[SPOIL_FLOATS] = {200.0f, 200.0f, 200.0f,  50.0f,   50.0f,   50.0f,  2.0f,   2.0f,
+                                        2.0f,   2.0f,   1000.0f, 1000.0f, 1000.0f, 1.0e6f, 1.0e6f, 1.0e6f};
+    ivl_in_t    copy = *in;
+    for (uint32_t i = 0; i < SPOIL_FLOATS; i++)
+    {
+        if (!number_in(*spoil_float(&copy, i), limits[i]))
+        {
+            return false;
+        }
+    }
+    const float n2 = in->q_WB.x * in->q_WB.x + in->q_WB.y * in->q_WB.y + in->q_WB.z * in->q_WB.z + in->q_WB.w * in->q_WB.w;
+    const bool  is_unit = (n2 >= 0.949f) && (n2 <= 1.051f);
+    const bool  is_recent =
+        (in->t_pose_us <= in->t_us) && ((double)(in->t_us - in->t_pose_us) * 1.0e-6 <= (double)cfg->stale_s_max + 1.0e-6);
+    return is_unit && is_recent && (in->t_us > t_last_us);
+}
+
+static bool approach_is_good(const ivl_command_t *cmd, const ivl_cfg_t *cfg)
+{
+    return (cmd->request == IVL_REQUEST_APPROACH) && isfinite(cmd->speed_mps) && isfinite(cmd->angle_rad) &&
+           (cmd->speed_mps >= cfg->speed_mps_min) && (cmd->speed_mps <= cfg->speed_mps_max) && (cmd->angle_rad >= 0.0f) &&
+           (cmd->angle_rad < 1.5708f);
+}
+
+// ---- random vehicles and inputs
+
+static void random_cfg(flight_t *f)
+{
+    ivl_cfg_t *cfg = &f->fix.cfg;
+    ivl_cfg_defaults(cfg);
+    cfg->tick_hz = (rng_below(&f->rng, 2) == 0u) ? 500.0f : 1000.0f;
+    cfg->mass_kg = rng_float(&f->rng, 0.02f, 0.05f);
+    cfg->kp_pos_xy_Npm = rng_float(&f->rng, 0.0f, 100.0f);
+    cfg->kp_att_xy_Nmprad = rng_float(&f->rng, 0.0f, 1.0f);
+    cfg->tilt_cmd_rad_max = rng_float(&f->rng, 0.1f, 1.2f);
+    cfg->stale_s_max = rng_float(&f->rng, 0.004f, 0.05f);
+    cfg->flip_s_max = rng_float(&f->rng, 0.01f, 0.3f);
+    cfg->coast_s_max = rng_float(&f->rng, 0.1f, 0.3f);
+    cfg->attached_s = rng_float(&f->rng, 0.0f, 0.2f);
+    cfg->approach_s_max = rng_float(&f->rng, 0.1f, 1.0f);
+    cfg->hang_s = rng_float(&f->rng, 0.02f, 0.1f);
+    cfg->cut_at_inverted = (uint8_t)rng_below(&f->rng, 2);
+    cfg->cut_on_contact = (uint8_t)rng_below(&f->rng, 2);
+    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_cfg_check(cfg));
+}
+
+static void random_request(flight_t *f)
+{
+    ivl_command_t *cmd = &f->fix.in.cmd;
+    const uint32_t dice = rng_below(&f->rng, 16);
+    cmd->request = (dice < 3u)    ? IVL_REQUEST_IDLE
+                   : (dice < 8u)  ? IVL_REQUEST_HOVER
+                   : (dice < 15u) ? IVL_REQUEST_APPROACH
+                                  : IVL_REQUEST_ABORT;
+    cmd->p_hover_W_m = rng_vec3(&f->rng, 3.0f);
+    cmd->speed_mps = rng_float(&f->rng, 0.1f, 6.0f);
+    cmd->angle_rad = rng_float(&f->rng, 0.0f, 1.57f);
+}
+
+static void random_state(flight_t *f)
+{
+    ivl_in_t      *in = &f->fix.in;
+    const uint32_t dice = rng_below(&f->rng, 8);
+    in->p_WB_m = rng_vec3(&f->rng, 2.2f);
+    in->v_WB_mps = rng_vec3(&f->rng, 4.0f);
+    in->w_B_radps = rng_vec3(&f->rng, (dice == 0u) ? 900.0f : 10.0f);
+    in->q_WB = (ivl_quat_t){0.0f, 0.0f, 0.0f, 1.0f};
+    if (dice < 2u)
+    {
+        in->q_WB = rng_quat(&f->rng);
+    }
+    in->f_B_mps2 = ivl_vec3(0.0f, 0.0f, (dice == 2u) ? -9.81f : 9.81f);
+    if (dice == 3u)
+    {
+        in->f_B_mps2 = rng_vec3(&f->rng, 1.0e5f);
+    }
+}
+
+static void next_input(flight_t *f)
+{
+    ivl_in_t      *in = &f->fix.in;
+    const uint64_t period_us = (uint64_t)(1.0e6f / f->fix.cfg.tick_hz);
+    in->t_us = f->t_last_us + period_us;
+    in->t_pose_us = in->t_us - rng_below(&f->rng, 4000);
+    if (rng_below(&f->rng, 30) == 0u)
+    {
+        random_request(f);
+    }
+    if (rng_below(&f->rng, 30) == 0u)
+    {
+        random_state(f);
+    }
+    if (rng_below(&f->rng, 100) == 0u)
+    {
+        const float        moment = rng_float(&f->rng, -0.001f, 0.022f);
+        const ivl_policy_t policy = {.seq = 1, .rrev_c_per_s = rng_float(&f->rng, -1.0f, 8.0f), .moment_y_Nm = moment};
+        (void)ivl_policy_commit(&f->fix.cfg, &f->fix.state, &policy);
+    }
+}
+
+// bursts, so that samples also grow old; several fields may be bad at once
+static void maybe_spoil(flight_t *f)
+{
+    const float dice = rng_float(&f->rng, 0.0f, 1.0f);
+    f->in_burst = f->in_burst ? (dice < f->stay_norm) : (dice < f->garbage_norm);
+    if (f->in_burst)
+    {
+        const uint32_t n = 1u + rng_below(&f->rng, 3);
+        for (uint32_t i = 0; i < n; i++)
+        {
+            spoil(&f->fix.in, (i == 0u) ? f->burst_kind : rng_below(&f->rng, SPOIL_COUNT));
+        }
+        n_spoiled++;
+        return;
+    }
+    f->burst_kind = rng_below(&f->rng, SPOIL_COUNT);
+}
+
+// ---- what must hold
+
+static void check_trigger(flight_t *f, uint32_t n_trigger_before, bool is_pose_good)
+{
+    const ivl_state_t *state = &f->fix.state;
+    const bool         is_armed = (f->last_phase == IVL_PHASE_IDLE) && (f->fix.out.phase != IVL_PHASE_IDLE);
+    if (is_armed)
+    {
+        f->n_trigger_cycle = 0;
+        n_cycles++;
+    }
+    if (state->diag.n_trigger != n_trigger_before)
+    {
+        f->n_trigger_cycle++;
+        n_triggers++;
+        TEST_ASSERT_EQUAL_UINT32(n_trigger_before + 1u, state->diag.n_trigger);
+        TEST_ASSERT_TRUE(is_pose_good && approach_is_good(&f->fix.in.cmd, &f->fix.cfg));
+        TEST_ASSERT_TRUE(state->snapshot.rrev_per_s >= state->snapshot.policy.rrev_c_per_s);
+        TEST_ASSERT_TRUE((state->snapshot.rrev_per_s > 0.0f) && (state->snapshot.d_ceil_m > 0.0f));
+        memcpy(&f->snapshot, &state->snapshot, sizeof f->snapshot);
+    }
+    TEST_ASSERT_TRUE(f->n_trigger_cycle <= 1u);
+    if (f->n_trigger_cycle == 1u)
+    {
+        TEST_ASSERT_EQUAL_MEMORY(&f->snapshot, &state->snapshot, sizeof f->snapshot);
+    }
+}
+
+static void check_motors(flight_t *f, bool is_pose_good)
+{
+    // a motor needs a sample younger than stale_s_max; one tick for rounding
+    f->n_bad_pose_run = is_pose_good ? 0u : f->n_bad_pose_run + 1u;
+    if ((float)f->n_bad_pose_run > f->fix.cfg.stale_s_max * f->fix.cfg.tick_hz + 1.0f)
+    {
+        TEST_ASSERT_FALSE(f->fix.out.motors_on);
+    }
+    // latched off means off until the cycle ends
+    const bool is_latched_off = ivl_motors_latched_off(&f->fix.state);
+    if (f->was_latched_off && !is_latched_off)
+    {
+        TEST_ASSERT_EQUAL_INT(IVL_PHASE_IDLE, f->fix.out.phase);
+    }
+    f->was_latched_off = is_latched_off;
+    // after a trigger only the flip may run a motor
+    if ((f->n_trigger_cycle == 1u) && f->fix.out.motors_on)
+    {
+        TEST_ASSERT_EQUAL_INT(IVL_PHASE_FLIP, f->fix.out.phase);
+    }
+    assert_output_sane(&f->fix);
+}
+
+static void fuzz_tick(flight_t *f)
+{
+    next_input(f);
+    const ivl_in_t clean = f->fix.in;
+    maybe_spoil(f);
+    const uint32_t n_trigger = f->fix.state.diag.n_trigger;
+    const bool     is_pose_good = pose_is_good(&f->fix.in, &f->fix.cfg, f->t_last_us);
+    ivl_step(&f->fix.cfg, &f->fix.state, &f->fix.in, &f->fix.out);
+    check_trigger(f, n_trigger, is_pose_good);
+    check_motors(f, is_pose_good);
+    n_ticks_in[f->fix.out.phase]++;
+    f->last_phase = f->fix.out.phase;
+    f->t_last_us = clean.t_us;
+    f->fix.in = clean;
+}
+
+static void fly(uint64_t seed)
+{
+    flight_t f = {.rng = {seed}};
+    fix_init(&f.fix);
+    random_cfg(&f);
+    ivl_init(&f.fix.cfg, &f.fix.state);
+    f.t_last_us = 4000000000u;
+    const float shares[] = {0.0f, 0.002f, 0.05f, 0.5f};
+    f.garbage_norm = shares[rng_below(&f.rng, 4)];
+    f.stay_norm = rng_float(&f.rng, 0.0f, 0.98f);
+    for (int i = 0; i < N_TICKS; i++)
+    {
+        fuzz_tick(&f);
+    }
+}
+
+static void test_invariants_hold_over_random_flights(void)
+{
+    for (uint64_t seed = 0; seed < N_FLIGHTS; seed++)
+    {
+        fly(seed);
+    }
+}
+
+static void test_random_flights_have_visited_everything(void)
+{
+    for (int i = 0; i < (int)IVL_PHASE_COUNT; i++)
+    {
+        TEST_ASSERT_TRUE_MESSAGE(n_ticks_in[i] > 10000u, ivl_phase_name((ivl_phase_t)i));
+    }
+    TEST_ASSERT_TRUE(n_triggers > 1000u);
+    TEST_ASSERT_TRUE(n_cycles > n_triggers);
+    TEST_ASSERT_TRUE(n_spoiled > 100000u);
+}
+
+// every byte of the input at random: nearly everything is garbage, and nothing may run
+static void test_random_bytes_never_start_a_motor(void)
+{
+    rng_t rng = {99};
+    fix_t fix;
+    fix_init(&fix);
+    fix_policy(&fix, 0.0f, 0.02f);
+    for (int i = 0; i < 300000; i++)
+    {
+        unsigned char bytes[sizeof fix.in];
+        for (size_t k = 0; k < sizeof bytes; k++)
+        {
+            bytes[k] = (unsigned char)rng_u64(&rng);
+        }
+        memcpy(&fix.in, bytes, sizeof bytes);
+        ivl_step(&fix.cfg, &fix.state, &fix.in, &fix.out);
+        assert_motors_off(&fix);
+        assert_phase(IVL_PHASE_IDLE, &fix);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_invariants_hold_over_random_flights);
+    RUN_TEST(test_random_flights_have_visited_everything);
+    RUN_TEST(test_random_bytes_never_start_a_motor);
+    return UNITY_END();
+}
