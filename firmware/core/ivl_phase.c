@@ -200,7 +200,6 @@ static void enter_ready(ivl_state_t *state)
 {
     state->triggered = false;
     memset(&state->snapshot, 0, sizeof state->snapshot);
-    memset(&state->contact, 0, sizeof state->contact);
 }
 
 static void enter(ivl_state_t *state, ivl_phase_t next, ivl_ceiling_t ceiling, ivl_cues_t cues)

@@ -91,6 +91,13 @@ static void test_lift_stays_between_a_fifth_of_the_weight_and_four_motors(void)
     TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 4.0f * 0.1615f, compute().thrust_N);
 }
 
+static void test_desired_rate_is_bounded_when_the_speed_is_far_off(void)
+{
+    // level, 40 m/s too slow: the force turns at Kp 40 m/s / F, of order 50 rad/s, and is limited to a tilt of 45 degrees
+    sample.v_WB_mps.x = -40.0f;
+    assert_moment(0.0f, 0.004f * 0.70710678f + 0.0017f * 10.0f, 0.0f, compute().moment_B_Nm);
+}
+
 static void test_thrust_is_zero_when_upside_down(void)
 {
     sample.q_WB = (ivl_quat_t){0.0f, 1.0f, 0.0f, 0.0f};
@@ -277,6 +284,7 @@ int main(void)
     RUN_TEST(test_rates_are_damped_and_the_gyroscopic_moment_is_cancelled);
     RUN_TEST(test_tilt_is_limited_when_the_target_is_far);
     RUN_TEST(test_lift_stays_between_a_fifth_of_the_weight_and_four_motors);
+    RUN_TEST(test_desired_rate_is_bounded_when_the_speed_is_far_off);
     RUN_TEST(test_thrust_is_zero_when_upside_down);
     RUN_TEST(test_wrench_is_that_of_the_law_in_double_precision);
     return UNITY_END();

@@ -173,6 +173,15 @@ static void test_trigger_is_live_in_approach_only(void)
     }
 }
 
+// intrusive: the table never leads back to approach after a trigger, and the trigger itself refuses as well
+static void test_trigger_does_not_fire_twice_when_the_phase_is_forced_back(void)
+{
+    fix_to_phase(&fix, IVL_PHASE_FLIP);
+    fix.state.phase = IVL_PHASE_APPROACH;
+    tick_to(IVL_PHASE_APPROACH);
+    TEST_ASSERT_EQUAL_UINT32(1, fix.state.diag.n_trigger);
+}
+
 static void test_flip_is_cut_when_the_body_passes_the_horizontal(void)
 {
     fix_to_phase(&fix, IVL_PHASE_FLIP);
@@ -357,6 +366,7 @@ int main(void)
     RUN_TEST(test_vehicle_that_is_tipped_over_is_not_armed_and_aborts);
     RUN_TEST(test_approach_aborts_when_it_takes_too_long);
     RUN_TEST(test_trigger_is_live_in_approach_only);
+    RUN_TEST(test_trigger_does_not_fire_twice_when_the_phase_is_forced_back);
     RUN_TEST(test_flip_is_cut_when_the_body_passes_the_horizontal);
     RUN_TEST(test_flip_goes_on_inverted_when_the_option_is_off_until_its_time_is_over);
     RUN_TEST(test_contact_cuts_in_flip_and_coast_when_the_option_is_on);
