@@ -10,8 +10,7 @@
 
 enum
 {
-    THREADS_MAX = 256,
-    CHUNK = 8 ///< rollouts that a thread takes at a time
+    THREADS_MAX = 256
 };
 
 // Parameters: those of the world, then those of the flight core under "firmware.", as doubles.
@@ -166,30 +165,31 @@ typedef struct
     atomic_size_t next;
 } batch_t;
 
+static bool next_of_batch(void *context, ivl_sim_job_t *job)
+{
+    batch_t *batch = context;
+    const size_t i = atomic_fetch_add(&batch->next, 1);
+    if (i >= batch->n)
+    {
+        return false;
+    }
+    *job = (ivl_sim_job_t){&batch->specs[i], &batch->outcomes[i], NULL};
+    return true;
+}
+
 static void *fly_batch(void *argument)
 {
     batch_t *batch = argument;
-    for (;;)
-    {
-        const size_t first = atomic_fetch_add(&batch->next, CHUNK);
-        if (first >= batch->n)
-        {
-            return NULL;
-        }
-        const size_t last = (first + CHUNK < batch->n) ? first + CHUNK : batch->n;
-        for (size_t i = first; i < last; i++)
-        {
-            ivl_sim_rollout(batch->model, &batch->specs[i], NULL, &batch->outcomes[i]);
-        }
-    }
+    ivl_sim_fly(batch->model, next_of_batch, batch);
+    return NULL;
 }
 
 static int thread_count(int asked, size_t n)
 {
     long threads = (asked > 0) ? asked : sysconf(_SC_NPROCESSORS_ONLN);
-    const size_t chunks = (n + CHUNK - 1) / CHUNK;
+    const size_t groups = (n + IVL_SIM_LANES - 1) / IVL_SIM_LANES;
     threads = (threads < 1) ? 1 : ((threads > THREADS_MAX) ? THREADS_MAX : threads);
-    return ((size_t)threads > chunks) ? (int)((chunks > 0) ? chunks : 1) : (int)threads;
+    return ((size_t)threads > groups) ? (int)((groups > 0) ? groups : 1) : (int)threads;
 }
 
 int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes)
@@ -211,6 +211,22 @@ int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threa
     return 0;
 }
 
+/// A batch of one.
+typedef struct
+{
+    ivl_sim_job_t job;
+    bool taken;
+} single_t;
+
+static bool next_of_single(void *context, ivl_sim_job_t *job)
+{
+    single_t *single = context;
+    const bool first = !single->taken;
+    single->taken = true;
+    *job = single->job;
+    return first;
+}
+
 long ivl_sil_trace(const void *model, const void *spec, double period_s, void *rows, size_t capacity, void *outcome)
 {
     if (!(period_s > 0.0))
@@ -218,7 +234,8 @@ long ivl_sil_trace(const void *model, const void *spec, double period_s, void *r
         return -1;
     }
     ivl_sim_tracer_t tracer = {.period_s = period_s, .rows = rows, .capacity = capacity};
-    ivl_sim_rollout(model, spec, &tracer, outcome);
+    single_t single = {{spec, outcome, &tracer}, false};
+    ivl_sim_fly(model, next_of_single, &single);
     return (long)tracer.n;
 }
 

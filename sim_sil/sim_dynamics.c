@@ -1,7 +1,7 @@
 #include "sim_dynamics.h"
 
 // Stabilisation of the length constraints: their error decays at this rate.  It only removes what truncation and rounding
-// leave (below 1 um); the motion does not depend on it.                                            [MODEL eq. 4.7]
+// leave; the motion does not depend on it.                                                        [MODEL eq. 4.7]
 static const double STABILISATION_PER_S = 150.0;
 
 // Compliance of a rod, m/(N s^2) in the units of the constraint's matrix.  Four parallel legs hold the body redundantly;
@@ -12,338 +12,390 @@ static const double ROD_COMPLIANCE_PER_KG = 1.0e-3;
 // cos(beta) is kept above this value.
 static const double COS_SIDEWAYS_MIN = 0.05;
 
-/// Positions and velocities of one evaluation, in body axes; legs in lanes.
-typedef struct
+enum
 {
-    ivl_rot_t R_WB;
-    ivl_d3_t up;     ///< the world's z axis
-    ivl_d3_t v, w;   ///< of the body
-    ivl_l3_t rod;    ///< hip to foot
-    ivl_l3_t n;      ///< rod / length
-    ivl_l3_t v_hip, v_foot, v_rod; ///< v_rod = v_foot - v_hip
-} kinematics_t;
+    N = 6
+};
 
-/// The unknowns of one linear system: body wrench or twist (6), and a multiplier a leg.
-typedef struct
+/// Place of element (i, j), i <= j, in a packed symmetric matrix.
+IVL_SIM_INLINE int packed(int i, int j)
 {
-    ivl_l3_t g;         ///< direction of the multiplier at the hip
-    ivl_l3_t hip_x_g;   ///< its moment about the body origin
-    ivl_v4_t compliance;
-} constraint_t;
-
-IVL_SIM_INLINE kinematics_t kinematics(const ivl_sim_model_t *model, const ivl_sim_kin_t *s)
-{
-    const ivl_l3_t hip = model->leg.hip_B_m;
-    kinematics_t k;
-    k.R_WB = ivl_rot_from_quat(s->q_WB);
-    k.up = k.R_WB.row[2];
-    k.w = ivl_d3_load(s->w_B_radps);
-    k.v = ivl_rot_apply_inverse(&k.R_WB, ivl_d3_load(s->v_WB_mps));
-    const ivl_l3_t p_foot = ivl_l3_sub(ivl_l3_load(s->p_foot_W_m), ivl_l3_set(ivl_d3_load(s->p_WB_m)));
-    k.rod = ivl_l3_sub(ivl_rot_apply_inverse_l3(&k.R_WB, p_foot), hip);
-    k.n = ivl_l3_scale(ivl_v4_set(1.0 / model->raw.leg_length_m), k.rod);
-    k.v_hip = ivl_l3_add(ivl_l3_set(k.v), ivl_l3_cross(ivl_l3_set(k.w), hip));
-    k.v_foot = ivl_rot_apply_inverse_l3(&k.R_WB, ivl_l3_load(s->v_foot_W_mps));
-    k.v_rod = ivl_l3_sub(k.v_foot, k.v_hip);
-    return k;
+    const int a = (i < j) ? i : j, b = (i < j) ? j : i;
+    return a * N - a * (a - 1) / 2 + b - a;
 }
 
-/// Angles of the hip's two hinges and the directions in which they move the rod.               [MODEL eq. 3.2]
-typedef struct
+void ivl_sim_lane_get(const ivl_sim_state_t *state, int lane, ivl_sim_kin_t *kin)
 {
-    ivl_v4_t alpha, beta; ///< deflection in the leg's plane, and sideways
-    ivl_l3_t e_alpha, e_beta;
-    ivl_v4_t inv_cos_beta;
-} hinge_t;
-
-IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, ivl_l3_t n)
-{
-    const ivl_v4_t c = ivl_l3_dot(n, leg->rest_B);
-    const ivl_v4_t s = ivl_l3_dot(n, leg->inplane_B);
-    const ivl_v4_t t = ivl_l3_dot(n, leg->sideways_B);
-    const ivl_v4_t root = ivl_v4_sqrt(c * c + s * s);
-    const ivl_v4_t floor_cos = ivl_v4_set(COS_SIDEWAYS_MIN);
-    const ivl_v4_t inv = 1.0 / ivl_v4_select(root > floor_cos, root, floor_cos);
-    hinge_t h;
-    h.alpha = ivl_v4_atan2(s, c);
-    h.beta = ivl_v4_atan2(t, root);
-    h.inv_cos_beta = inv;
-    const ivl_v4_t ca = c * inv, sa = s * inv;
-    h.e_alpha = ivl_l3_sub(ivl_l3_scale(ca, leg->inplane_B), ivl_l3_scale(sa, leg->rest_B));
-    h.e_beta = ivl_l3_sub(ivl_l3_scale(root, leg->sideways_B),
-                          ivl_l3_scale(t, ivl_l3_add(ivl_l3_scale(ca, leg->rest_B), ivl_l3_scale(sa, leg->inplane_B))));
-    return h;
-}
-
-/// Force of the hip's springs and dampers on the foot; the rod's hip end gets the opposite, the body the opposite couple.
-/// [MODEL eq. 3.4]
-IVL_SIM_INLINE ivl_l3_t hip_couple(const ivl_sim_model_t *model, const kinematics_t *k)
-{
-    const double k_N = model->raw.leg_stiffness_Nmprad, c_N = model->raw.leg_damping_Nmsprad;
-    const ivl_v4_t inv_length = ivl_v4_set(1.0 / model->raw.leg_length_m);
-    const hinge_t h = hinge(&model->leg, k->n);
-    const ivl_l3_t n_rate = ivl_l3_scale(inv_length, ivl_l3_sub(k->v_rod, ivl_l3_cross(ivl_l3_set(k->w), k->rod)));
-    const ivl_v4_t alpha_rate = ivl_l3_dot(n_rate, h.e_alpha) * h.inv_cos_beta;
-    const ivl_v4_t beta_rate = ivl_l3_dot(n_rate, h.e_beta);
-    const ivl_v4_t torque_alpha = -(k_N * h.alpha + c_N * alpha_rate);
-    const ivl_v4_t torque_beta = -(k_N * h.beta + c_N * beta_rate);
-    return ivl_l3_scale(inv_length, ivl_l3_add(ivl_l3_scale(torque_alpha * h.inv_cos_beta, h.e_alpha),
-                                               ivl_l3_scale(torque_beta, h.e_beta)));
-}
-
-/// Without the part along the ceiling's normal, for a foot that slides.
-IVL_SIM_INLINE ivl_l3_t along_ceiling(ivl_v4_t sliding, ivl_l3_t up, ivl_l3_t a)
-{
-    return ivl_l3_sub(a, ivl_l3_scale(sliding * ivl_l3_dot(up, a), up));
-}
-
-IVL_SIM_INLINE constraint_t constraint(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact,
-                                       const kinematics_t *k)
-{
-    const ivl_v4_t inv_mass = ivl_v4_load(contact->inverse_mass);
-    const ivl_l3_t pn = along_ceiling(ivl_v4_load(contact->sliding), ivl_l3_set(k->up), k->n);
-    constraint_t c;
-    c.g = ivl_l3_add(k->n, ivl_l3_scale(model->leg.mass_cross_kg * inv_mass, pn));
-    c.hip_x_g = ivl_l3_cross(model->leg.hip_B_m, c.g);
-    c.compliance = inv_mass * ivl_l3_dot(k->n, pn) + ROD_COMPLIANCE_PER_KG;
-    return c;
-}
-
-/// Solves the symmetric positive definite 4 x 4 system a x = b, L D L^T.
-IVL_SIM_INLINE ivl_v4_t solve4(const ivl_v4_t a[4], ivl_v4_t b)
-{
-    const double d0 = 1.0 / a[0][0];
-    const double l10 = a[0][1] * d0, l20 = a[0][2] * d0, l30 = a[0][3] * d0;
-    const double d1 = 1.0 / (a[1][1] - l10 * a[0][1]);
-    const double u21 = a[1][2] - l10 * a[0][2], u31 = a[1][3] - l10 * a[0][3];
-    const double l21 = u21 * d1, l31 = u31 * d1;
-    const double d2 = 1.0 / (a[2][2] - l20 * a[0][2] - l21 * u21);
-    const double u32 = a[2][3] - l20 * a[0][3] - l21 * u31;
-    const double l32 = u32 * d2;
-    const double d3 = 1.0 / (a[3][3] - l30 * a[0][3] - l31 * u31 - l32 * u32);
-    const double y0 = b[0];
-    const double y1 = b[1] - l10 * y0;
-    const double y2 = b[2] - l20 * y0 - l21 * y1;
-    const double y3 = b[3] - l30 * y0 - l31 * y1 - l32 * y2;
-    const double x3 = y3 * d3;
-    const double x2 = y2 * d2 - l32 * x3;
-    const double x1 = y1 * d1 - l21 * x2 - l31 * x3;
-    const double x0 = y0 * d0 - l10 * x1 - l20 * x2 - l30 * x3;
-    return (ivl_v4_t){x0, x1, x2, x3};
-}
-
-/// Solves  M u = b + J^T x,  J u + compliance x = r  for the twist u and the multipliers x.      [MODEL eq. 4.10]
-IVL_SIM_INLINE void solve_constrained(const double inv_m[6][6], const constraint_t *c, const double b[6], ivl_v4_t r,
-                                      double u[6], ivl_v4_t *x)
-{
-    const ivl_v4_t J[6] = {c->g.x, c->g.y, c->g.z, c->hip_x_g.x, c->hip_x_g.y, c->hip_x_g.z};
-    ivl_v4_t W[6];
-    ivl_v4_t A[4] = {{0}, {0}, {0}, {0}};
-    for (int i = 0; i < 6; i++)
+    const double *from = (const double *)state;
+    double *to = (double *)kin;
+    for (size_t i = 0; i < sizeof *kin / sizeof *to; i++)
     {
-        W[i] = inv_m[i][0] * J[0];
-        for (int j = 1; j < 6; j++)
-        {
-            W[i] += inv_m[i][j] * J[j];
-        }
-    }
-    for (int leg = 0; leg < 4; leg++)
-    {
-        for (int i = 0; i < 6; i++)
-        {
-            A[leg] += W[i][leg] * J[i];
-        }
-        A[leg][leg] += c->compliance[leg];
-    }
-    for (int i = 0; i < 6; i++)
-    {
-        r -= W[i] * b[i];
-    }
-    *x = solve4((const ivl_v4_t *)A, r);
-    for (int i = 0; i < 6; i++)
-    {
-        double free = inv_m[i][0] * b[0];
-        for (int j = 1; j < 6; j++)
-        {
-            free += inv_m[i][j] * b[j];
-        }
-        u[i] = free + ivl_v4_sum(W[i] * *x);
+        to[i] = from[i * IVL_SIM_LANES + (size_t)lane];
     }
 }
 
-/// Inverse of a symmetric positive definite 6 x 6 matrix, by Gauss-Jordan elimination (no pivoting is needed).
-static void invert6(const double a[6][6], double inverse[6][6])
+void ivl_sim_lane_set(ivl_sim_state_t *state, int lane, const ivl_sim_kin_t *kin)
 {
-    double m[6][12];
-    for (int i = 0; i < 6; i++)
+    const double *from = (const double *)kin;
+    double *to = (double *)state;
+    for (size_t i = 0; i < sizeof *kin / sizeof *from; i++)
     {
-        for (int j = 0; j < 6; j++)
+        to[i * IVL_SIM_LANES + (size_t)lane] = from[i];
+    }
+}
+
+// ---- which feet hold on -----------------------------------------------------------------------------------------------
+
+/// Inverse of a symmetric positive definite matrix, by Gauss-Jordan elimination (no pivoting is needed).
+static void invert(const double a[N][N], double inverse[N][N])
+{
+    double m[N][2 * N];
+    for (int i = 0; i < N; i++)
+    {
+        for (int j = 0; j < N; j++)
         {
             m[i][j] = a[i][j];
-            m[i][6 + j] = (i == j) ? 1.0 : 0.0;
+            m[i][N + j] = (i == j) ? 1.0 : 0.0;
         }
     }
-    for (int p = 0; p < 6; p++)
+    for (int p = 0; p < N; p++)
     {
-        const double inv = 1.0 / m[p][p];
-        for (int j = 0; j < 12; j++)
+        const double pivot = 1.0 / m[p][p];
+        for (int j = 0; j < 2 * N; j++)
         {
-            m[p][j] *= inv;
+            m[p][j] *= pivot;
         }
-        for (int i = 0; i < 6; i++)
+        for (int i = 0; i < N; i++)
         {
             const double f = (i == p) ? 0.0 : m[i][p];
-            for (int j = 0; j < 12; j++)
+            for (int j = 0; j < 2 * N; j++)
             {
                 m[i][j] -= f * m[p][j];
             }
         }
     }
-    for (int i = 0; i < 6; i++)
+    for (int i = 0; i < N; i++)
     {
-        for (int j = 0; j < 6; j++)
-        {
-            inverse[i][j] = m[i][6 + j];
-        }
+        memcpy(inverse[i], &m[i][N], sizeof inverse[i]);
     }
 }
 
-/// Adds the point mass mu (a a^T) at x: mu times the square of the velocity along the unit vector a.
-static void add_mass_along(double m[6][6], double mu, ivl_d3_t x, ivl_d3_t a)
+/// Adds a mass mu at x that resists motion along the unit vector a only.
+static void add_mass_along(double m[N][N], double mu, ivl_d3_t x, ivl_d3_t a)
 {
     const ivl_d3_t moment = ivl_d3_cross(x, a);
-    const double row[6] = {a.x, a.y, a.z, moment.x, moment.y, moment.z};
-    for (int i = 0; i < 6; i++)
+    const double row[N] = {a.x, a.y, a.z, moment.x, moment.y, moment.z};
+    for (int i = 0; i < N; i++)
     {
-        for (int j = 0; j < 6; j++)
+        for (int j = 0; j < N; j++)
         {
             m[i][j] += mu * row[i] * row[j];
         }
     }
 }
 
-/// Mass matrix of the body and of the hip ends of the legs.                                     [MODEL eq. 4.8]
-static void build_mass(const ivl_sim_model_t *model, ivl_sim_contact_t *contact)
+/// Mass matrix of the body and of the hip ends of the legs.                                       [MODEL eq. 4.8]
+static void build_mass(const ivl_sim_model_t *model, const ivl_sim_foot_t foot[IVL_SIM_LEGS], double m[N][N])
 {
     const ivl_sim_params_t *raw = &model->raw;
-    const double diagonal[6] = {raw->body_mass_kg,         raw->body_mass_kg,         raw->body_mass_kg,
-                                raw->body_inertia_xx_kgm2, raw->body_inertia_yy_kgm2, raw->body_inertia_zz_kgm2};
     const ivl_sim_leg_model_t *leg = &model->leg;
-    memset(contact->mass, 0, sizeof contact->mass);
-    for (int i = 0; i < 6; i++)
+    const double diagonal[N] = {raw->body_mass_kg,         raw->body_mass_kg,         raw->body_mass_kg,
+                                raw->body_inertia_xx_kgm2, raw->body_inertia_yy_kgm2, raw->body_inertia_zz_kgm2};
+    memset(m, 0, sizeof(double[N][N]));
+    for (int i = 0; i < N; i++)
     {
-        contact->mass[i][i] = diagonal[i];
+        m[i][i] = diagonal[i];
     }
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        const double mu = leg->mass_hip_kg - leg->mass_cross_kg * leg->mass_cross_kg * contact->inverse_mass[i];
-        const ivl_d3_t hip = ivl_l3_lane(leg->hip_B_m, i);
-        add_mass_along(contact->mass, mu, hip, ivl_d3(1.0, 0.0, 0.0));
-        add_mass_along(contact->mass, mu, hip, ivl_d3(0.0, 1.0, 0.0));
-        add_mass_along(contact->mass, mu, hip, ivl_d3(0.0, 0.0, 1.0));
+        // a free foot yields to the hip's acceleration, a held one does not
+        const double yields = (foot[i] == IVL_SIM_FOOT_STUCK) ? 0.0 : 1.0;
+        const double mu = leg->mass_hip_kg - yields * leg->mass_cross_kg * leg->mass_cross_kg / leg->mass_foot_kg;
+        add_mass_along(m, mu, leg->hip_B_m[i], ivl_d3(1.0, 0.0, 0.0));
+        add_mass_along(m, mu, leg->hip_B_m[i], ivl_d3(0.0, 1.0, 0.0));
+        add_mass_along(m, mu, leg->hip_B_m[i], ivl_d3(0.0, 0.0, 1.0));
     }
-    invert6((const double(*)[6])contact->mass, contact->inverse_mass6);
 }
 
-void ivl_sim_contact_set(const ivl_sim_model_t *model, ivl_sim_contact_t *contact, int leg, ivl_sim_foot_t foot)
+static void store_packed(const double m[N][N], ivl_wide_t to[IVL_SIM_PACKED], int lane)
 {
-    contact->foot[leg] = foot;
-    contact->inverse_mass[leg] = (foot == IVL_SIM_FOOT_STUCK) ? 0.0 : 1.0 / model->leg.mass_foot_kg;
-    contact->sliding[leg] = (foot == IVL_SIM_FOOT_SLIDING) ? 1.0 : 0.0;
+    for (int i = 0; i < N; i++)
+    {
+        for (int j = i; j < N; j++)
+        {
+            to[packed(i, j)][lane] = m[i][j];
+        }
+    }
+}
+
+void ivl_sim_contact_set(const ivl_sim_model_t *model, ivl_sim_contact_t *contact, int lane,
+                         const ivl_sim_foot_t foot[IVL_SIM_LEGS])
+{
+    double m[N][N], inverse[N][N];
+    build_mass(model, foot, m);
+    invert((const double(*)[N])m, inverse);
+    store_packed((const double(*)[N])m, contact->mass6, lane);
+    store_packed((const double(*)[N])inverse, contact->inverse_mass6, lane);
     contact->any_sliding = false;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        contact->any_sliding = contact->any_sliding || (contact->foot[i] == IVL_SIM_FOOT_SLIDING);
+        contact->inverse_mass[i][lane] = (foot[i] == IVL_SIM_FOOT_STUCK) ? 0.0 : 1.0 / model->leg.mass_foot_kg;
+        contact->sliding[i][lane] = (foot[i] == IVL_SIM_FOOT_SLIDING) ? 1.0 : 0.0;
+        contact->any_sliding = contact->any_sliding || ivl_mask_any(contact->sliding[i] > 0.0);
     }
-    build_mass(model, contact);
 }
 
-void ivl_sim_contact_init(const ivl_sim_model_t *model, ivl_sim_contact_t *contact)
-{
-    memset(contact, 0, sizeof *contact);
-    for (int i = 0; i < IVL_SIM_LEGS; i++)
-    {
-        contact->inverse_mass[i] = 1.0 / model->leg.mass_foot_kg;
-    }
-    build_mass(model, contact);
-}
-
-/// A sliding foot does not yield along the ceiling's normal: the hip carries more mass in that direction, which turns
-/// with the body, so that the matrix must be rebuilt at each evaluation.
-static void mass_while_sliding(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, ivl_d3_t up,
-                               double inverse[6][6])
+/// A sliding foot does not yield along the ceiling's normal: its hip carries more mass in that direction, which turns with
+/// the body, so that the matrix must be made anew at each evaluation.
+static void inverse_while_sliding(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_w3_t *up,
+                                  ivl_wide_t inverse6[IVL_SIM_PACKED])
 {
     const ivl_sim_leg_model_t *leg = &model->leg;
-    double m[6][6];
-    memcpy(m, contact->mass, sizeof m);
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        double m[N][N], inverse[N][N];
+        for (int i = 0; i < N; i++)
+        {
+            for (int j = 0; j < N; j++)
+            {
+                m[i][j] = contact->mass6[packed(i, j)][lane];
+            }
+        }
+        bool slides = false;
+        for (int i = 0; i < IVL_SIM_LEGS; i++)
+        {
+            const double mu = contact->sliding[i][lane] * leg->mass_cross_kg * leg->mass_cross_kg / leg->mass_foot_kg;
+            slides = slides || contact->sliding[i][lane] > 0.0;
+            add_mass_along(m, mu, leg->hip_B_m[i], ivl_d3(up->x[lane], up->y[lane], up->z[lane]));
+        }
+        if (slides)
+        {
+            invert((const double(*)[N])m, inverse);
+            store_packed((const double(*)[N])inverse, inverse6, lane);
+        }
+    }
+}
+
+// ---- one evaluation ---------------------------------------------------------------------------------------------------
+
+/// Positions and velocities in body axes.
+typedef struct
+{
+    ivl_wrot_t R_WB;
+    ivl_w3_t up;   ///< the world's z axis
+    ivl_w3_t v, w; ///< of the body
+    ivl_w3_t rod[IVL_SIM_LEGS];   ///< hip to foot
+    ivl_w3_t n[IVL_SIM_LEGS];     ///< rod / length
+    ivl_w3_t v_rod[IVL_SIM_LEGS]; ///< velocity of the foot minus that of the hip
+} kinematics_t;
+
+IVL_SIM_INLINE void kinematics(const ivl_sim_model_t *model, const ivl_sim_state_t *s, kinematics_t *k)
+{
+    const ivl_wide_t inv_length = ivl_wide(1.0 / model->raw.leg_length_m);
+    k->R_WB = ivl_wrot_from_quat(s->q_WB);
+    k->up = k->R_WB.row[2];
+    k->w = s->w_B_radps;
+    k->v = ivl_wrot_apply_inverse(&k->R_WB, s->v_WB_mps);
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        const double mu = leg->mass_cross_kg * leg->mass_cross_kg * contact->inverse_mass[i] * contact->sliding[i];
-        add_mass_along(m, mu, ivl_l3_lane(leg->hip_B_m, i), up);
+        const ivl_d3_t hip = model->leg.hip_B_m[i];
+        const ivl_w3_t foot = ivl_wrot_apply_inverse(&k->R_WB, ivl_w3_sub(s->p_foot_W_m[i], s->p_WB_m));
+        const ivl_w3_t v_foot = ivl_wrot_apply_inverse(&k->R_WB, s->v_foot_W_mps[i]);
+        k->rod[i] = (ivl_w3_t){foot.x - hip.x, foot.y - hip.y, foot.z - hip.z};
+        k->n[i] = ivl_w3_scale(inv_length, k->rod[i]);
+        k->v_rod[i] = ivl_w3_sub(v_foot, ivl_w3_add(k->v, ivl_w3_cross_d3(k->w, hip)));
     }
-    invert6((const double(*)[6])m, inverse);
+}
+
+/// Angles of a hip's two hinges and the directions in which they move the rod.                    [MODEL eq. 3.2]
+typedef struct
+{
+    ivl_wide_t alpha, beta; ///< deflection in the leg's plane, and sideways
+    ivl_w3_t e_alpha, e_beta;
+    ivl_wide_t inv_cos_beta;
+} hinge_t;
+
+IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n)
+{
+    const ivl_d3_t e1 = leg->rest_B[i], e2 = leg->inplane_B[i], e3 = leg->sideways_B[i];
+    const ivl_wide_t c = ivl_w3_dot_d3(n, e1), s = ivl_w3_dot_d3(n, e2), t = ivl_w3_dot_d3(n, e3);
+    const ivl_wide_t root = ivl_wide_sqrt(c * c + s * s);
+    const ivl_wide_t least = ivl_wide(COS_SIDEWAYS_MIN);
+    const ivl_wide_t inv = 1.0 / ivl_wide_select(root > least, root, least);
+    const ivl_wide_t ca = c * inv, sa = s * inv;
+    hinge_t h;
+    h.alpha = ivl_wide_atan2(s, c);
+    h.beta = ivl_wide_atan2(t, root);
+    h.inv_cos_beta = inv;
+    h.e_alpha = (ivl_w3_t){ca * e2.x - sa * e1.x, ca * e2.y - sa * e1.y, ca * e2.z - sa * e1.z};
+    h.e_beta = (ivl_w3_t){root * e3.x - t * (ca * e1.x + sa * e2.x), root * e3.y - t * (ca * e1.y + sa * e2.y),
+                          root * e3.z - t * (ca * e1.z + sa * e2.z)};
+    return h;
+}
+
+/// Force of a hip's springs and dampers on the foot; the rod's hip end gets the opposite, the body the opposite couple.
+/// [MODEL eq. 3.4]
+IVL_SIM_INLINE ivl_w3_t hip_couple(const ivl_sim_model_t *model, const kinematics_t *k, int i)
+{
+    const double stiffness = model->raw.leg_stiffness_Nmprad, damping = model->raw.leg_damping_Nmsprad;
+    const double inv_length = 1.0 / model->raw.leg_length_m;
+    const hinge_t h = hinge(&model->leg, i, k->n[i]);
+    const ivl_w3_t turning = ivl_w3_sub(k->v_rod[i], ivl_w3_cross(k->w, k->rod[i]));
+    const ivl_wide_t alpha_rate = inv_length * ivl_w3_dot(turning, h.e_alpha) * h.inv_cos_beta;
+    const ivl_wide_t beta_rate = inv_length * ivl_w3_dot(turning, h.e_beta);
+    const ivl_wide_t torque_alpha = -(stiffness * h.alpha + damping * alpha_rate) * inv_length;
+    const ivl_wide_t torque_beta = -(stiffness * h.beta + damping * beta_rate) * inv_length;
+    return ivl_w3_plus(ivl_w3_scale(torque_alpha * h.inv_cos_beta, h.e_alpha), torque_beta, h.e_beta);
+}
+
+/// Without the part along the ceiling's normal, for a foot that slides.
+IVL_SIM_INLINE ivl_w3_t along_ceiling(ivl_wide_t sliding, ivl_w3_t up, ivl_w3_t a)
+{
+    return ivl_w3_plus(a, -sliding * ivl_w3_dot(up, a), up);
+}
+
+/// A leg's row of the constraint: multiplier direction g at the hip, its moment, its own compliance.  [MODEL eq. 4.9]
+typedef struct
+{
+    ivl_w3_t g, hip_x_g;
+    ivl_wide_t compliance;
+} row_t;
+
+IVL_SIM_INLINE row_t constraint_row(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const kinematics_t *k,
+                                    int i)
+{
+    const ivl_w3_t pn = along_ceiling(contact->sliding[i], k->up, k->n[i]);
+    row_t r;
+    r.g = ivl_w3_plus(k->n[i], model->leg.mass_cross_kg * contact->inverse_mass[i], pn);
+    r.hip_x_g = ivl_w3_cross_from_d3(model->leg.hip_B_m[i], r.g);
+    r.compliance = contact->inverse_mass[i] * ivl_w3_dot(k->n[i], pn) + ROD_COMPLIANCE_PER_KG;
+    return r;
+}
+
+/// Solves the symmetric positive definite system a x = b of four equations, L D L^T.
+IVL_SIM_INLINE void solve4(ivl_wide_t a[4][4], const ivl_wide_t b[4], ivl_wide_t x[4])
+{
+    const ivl_wide_t d0 = 1.0 / a[0][0];
+    const ivl_wide_t l10 = a[0][1] * d0, l20 = a[0][2] * d0, l30 = a[0][3] * d0;
+    const ivl_wide_t d1 = 1.0 / (a[1][1] - l10 * a[0][1]);
+    const ivl_wide_t u21 = a[1][2] - l10 * a[0][2], u31 = a[1][3] - l10 * a[0][3];
+    const ivl_wide_t l21 = u21 * d1, l31 = u31 * d1;
+    const ivl_wide_t d2 = 1.0 / (a[2][2] - l20 * a[0][2] - l21 * u21);
+    const ivl_wide_t u32 = a[2][3] - l20 * a[0][3] - l21 * u31;
+    const ivl_wide_t l32 = u32 * d2;
+    const ivl_wide_t d3 = 1.0 / (a[3][3] - l30 * a[0][3] - l31 * u31 - l32 * u32);
+    const ivl_wide_t y1 = b[1] - l10 * b[0];
+    const ivl_wide_t y2 = b[2] - l20 * b[0] - l21 * y1;
+    const ivl_wide_t y3 = b[3] - l30 * b[0] - l31 * y1 - l32 * y2;
+    x[3] = y3 * d3;
+    x[2] = y2 * d2 - l32 * x[3];
+    x[1] = y1 * d1 - l21 * x[2] - l31 * x[3];
+    x[0] = b[0] * d0 - l10 * x[1] - l20 * x[2] - l30 * x[3];
+}
+
+/// Solves  M u = b + J^T x,  J u + compliance x = r  for the twist u and the multipliers x.        [MODEL eq. 4.10]
+IVL_SIM_INLINE void solve_constrained(const ivl_wide_t inverse6[IVL_SIM_PACKED], const row_t rows[IVL_SIM_LEGS],
+                                      const ivl_wide_t b[N], const ivl_wide_t r[IVL_SIM_LEGS], ivl_wide_t u[N],
+                                      ivl_wide_t x[IVL_SIM_LEGS])
+{
+    ivl_wide_t J[IVL_SIM_LEGS][N], W[IVL_SIM_LEGS][N], A[4][4], rhs[4];
+    for (int leg = 0; leg < IVL_SIM_LEGS; leg++)
+    {
+        const ivl_wide_t row[N] = {rows[leg].g.x,       rows[leg].g.y,       rows[leg].g.z,
+                                   rows[leg].hip_x_g.x, rows[leg].hip_x_g.y, rows[leg].hip_x_g.z};
+        rhs[leg] = r[leg];
+        for (int i = 0; i < N; i++)
+        {
+            J[leg][i] = row[i];
+            W[leg][i] = inverse6[packed(i, 0)] * row[0];
+            for (int j = 1; j < N; j++)
+            {
+                W[leg][i] += inverse6[packed(i, j)] * row[j];
+            }
+            rhs[leg] -= W[leg][i] * b[i];
+        }
+        for (int other = 0; other <= leg; other++)
+        {
+            A[other][leg] = W[leg][0] * J[other][0];
+            for (int i = 1; i < N; i++)
+            {
+                A[other][leg] += W[leg][i] * J[other][i];
+            }
+        }
+        A[leg][leg] += rows[leg].compliance;
+    }
+    solve4(A, rhs, x);
+    for (int i = 0; i < N; i++)
+    {
+        u[i] = inverse6[packed(i, 0)] * b[0];
+        for (int j = 1; j < N; j++)
+        {
+            u[i] += inverse6[packed(i, j)] * b[j];
+        }
+        for (int leg = 0; leg < IVL_SIM_LEGS; leg++)
+        {
+            u[i] += W[leg][i] * x[leg];
+        }
+    }
 }
 
 /// Height of the highest point of a plate above the body origin.
-IVL_SIM_INLINE double plate_top(const ivl_sim_plate_t *plate, ivl_d3_t up)
+IVL_SIM_INLINE ivl_wide_t plate_top(const ivl_sim_plate_t *plate, ivl_w3_t up)
 {
-    return fabs(up.x) * plate->half_m[0] + fabs(up.y) * plate->half_m[1] + fabs(up.z) * plate->half_m[2] +
-           up.z * plate->center_z_m;
+    return ivl_wide_abs(up.x) * plate->half_m[0] + ivl_wide_abs(up.y) * plate->half_m[1] +
+           ivl_wide_abs(up.z) * plate->half_m[2] + up.z * plate->center_z_m;
 }
 
-/// Force and moment (body axes, about the body origin) of a plate's corners that press on the ceiling.
-/// Hunt-Crossley normal force, regularised Coulomb friction.                                     [MODEL eq. 5.1, 5.2]
-static void plate_force(const ivl_sim_model_t *model, const kinematics_t *k, double height_m, int index, double b[6])
+/// Adds the wrench of one corner that presses on the ceiling: Hunt-Crossley normal force, regularised Coulomb friction.
+/// [MODEL eq. 5.1, 5.2]
+IVL_SIM_INLINE void corner_force(const ivl_sim_params_t *raw, const kinematics_t *k, ivl_wide_t height, ivl_d3_t x,
+                                 ivl_wide_t b[N])
 {
-    const ivl_sim_plate_t *plate = &model->plate[index];
-    const ivl_sim_params_t *raw = &model->raw;
-    for (int i = 0; i < IVL_SIM_CORNERS; i++)
+    const ivl_wide_t zero = ivl_wide(0.0);
+    const ivl_wide_t depth = height + ivl_w3_dot_d3(k->up, x) - raw->world_ceiling_height_m;
+    const ivl_w3_t v = ivl_w3_add(k->v, ivl_w3_cross_d3(k->w, x));
+    const ivl_wide_t depth_rate = ivl_w3_dot(k->up, v);
+    const ivl_wide_t press = raw->plate_stiffness_Npm * depth * (1.0 + raw->plate_damping_spm * depth_rate);
+    const ivl_mask_t touches = (depth > zero) & (press > zero);
+    const ivl_w3_t slip = ivl_w3_plus(v, -depth_rate, k->up);
+    const double slow = raw->plate_slip_speed_mps;
+    const ivl_wide_t drag = raw->plate_friction_norm * press / ivl_wide_sqrt(ivl_w3_dot(slip, slip) + slow * slow);
+    const ivl_w3_t f = ivl_w3_sub(ivl_w3_scale(-press, k->up), ivl_w3_scale(drag, slip));
+    const ivl_w3_t m = ivl_w3_cross_from_d3(x, f);
+    const ivl_wide_t wrench[N] = {f.x, f.y, f.z, m.x, m.y, m.z};
+    for (int i = 0; i < N; i++)
     {
-        const ivl_d3_t x = ivl_d3(plate->corner_B_m[0][i], plate->corner_B_m[1][i], plate->corner_B_m[2][i]);
-        const double depth = height_m + ivl_d3_dot(k->up, x) - raw->world_ceiling_height_m;
-        if (depth > 0.0)
-        {
-            const ivl_d3_t v = ivl_d3_add(k->v, ivl_d3_cross(k->w, x));
-            const double depth_rate = ivl_d3_dot(k->up, v);
-            const double press = raw->plate_stiffness_Npm * depth * (1.0 + raw->plate_damping_spm * depth_rate);
-            const double normal = (press > 0.0) ? press : 0.0;
-            const ivl_d3_t slip = ivl_d3_sub(v, ivl_d3_scale(depth_rate, k->up));
-            const double slow = raw->plate_slip_speed_mps;
-            const double drag = raw->plate_friction_norm * normal / sqrt(ivl_d3_dot(slip, slip) + slow * slow);
-            const ivl_d3_t f = ivl_d3_sub(ivl_d3_scale(-normal, k->up), ivl_d3_scale(drag, slip));
-            const ivl_d3_t m = ivl_d3_cross(x, f);
-            const double wrench[6] = {f.x, f.y, f.z, m.x, m.y, m.z};
-            for (int j = 0; j < 6; j++)
-            {
-                b[j] += wrench[j];
-            }
-        }
+        b[i] = ivl_wide_select(touches, b[i] + wrench[i], b[i]);
     }
 }
 
 /// What acts on the body except the legs: weight, rotors, drag, plates, gyroscopic moment.
 IVL_SIM_INLINE void body_wrench(const ivl_sim_model_t *model, const ivl_sim_load_t *load, const kinematics_t *k,
-                                const ivl_sim_kin_t *s, double b[6], ivl_sim_forces_t *forces)
+                                ivl_wide_t height, ivl_wide_t b[N], ivl_wide_t overlap[IVL_SIM_PLATES])
 {
     const ivl_sim_params_t *raw = &model->raw;
     const double weight = raw->body_mass_kg * raw->world_gravity_mps2;
+    const double ixx = raw->body_inertia_xx_kgm2, iyy = raw->body_inertia_yy_kgm2, izz = raw->body_inertia_zz_kgm2;
     b[0] = -weight * k->up.x - raw->aero_drag_xy_Nspm * k->v.x;
     b[1] = -weight * k->up.y - raw->aero_drag_xy_Nspm * k->v.y;
     b[2] = -weight * k->up.z - raw->aero_drag_z_Nspm * k->v.z + load->thrust_N;
-    b[3] = load->torque_B_Nm[0] - (raw->body_inertia_zz_kgm2 - raw->body_inertia_yy_kgm2) * k->w.y * k->w.z;
-    b[4] = load->torque_B_Nm[1] - (raw->body_inertia_xx_kgm2 - raw->body_inertia_zz_kgm2) * k->w.z * k->w.x;
-    b[5] = load->torque_B_Nm[2] - (raw->body_inertia_yy_kgm2 - raw->body_inertia_xx_kgm2) * k->w.x * k->w.y;
-    for (int i = 0; i < IVL_SIM_PLATES; i++)
+    b[3] = load->torque_B_Nm.x - (izz - iyy) * k->w.y * k->w.z;
+    b[4] = load->torque_B_Nm.y - (ixx - izz) * k->w.z * k->w.x;
+    b[5] = load->torque_B_Nm.z - (iyy - ixx) * k->w.x * k->w.y;
+    for (int p = 0; p < IVL_SIM_PLATES; p++)
     {
-        forces->plate_touches[i] = s->p_WB_m[2] + plate_top(&model->plate[i], k->up) > raw->world_ceiling_height_m;
-        if (forces->plate_touches[i])
+        overlap[p] = height + plate_top(&model->plate[p], k->up) - raw->world_ceiling_height_m;
+        if (ivl_mask_any(overlap[p] > 0.0))
         {
-            plate_force(model, k, s->p_WB_m[2], i, b);
+            for (int i = 0; i < IVL_SIM_CORNERS; i++)
+            {
+                corner_force(raw, k, height, model->plate[p].corner_B_m[i], b);
+            }
         }
     }
 }
 
-IVL_SIM_INLINE void subtract_wrench(double b[6], ivl_d3_t force, ivl_d3_t moment)
+IVL_SIM_INLINE void subtract_wrench(ivl_wide_t b[N], ivl_w3_t force, ivl_w3_t moment)
 {
     b[0] -= force.x;
     b[1] -= force.y;
@@ -353,269 +405,279 @@ IVL_SIM_INLINE void subtract_wrench(double b[6], ivl_d3_t force, ivl_d3_t moment
     b[5] -= moment.z;
 }
 
-/// dq/dt = q (0, w) / 2
-IVL_SIM_INLINE void quaternion_rate(const double q[4], ivl_d3_t w, double rate[4])
-{
-    rate[0] = 0.5 * (q[3] * w.x + q[1] * w.z - q[2] * w.y);
-    rate[1] = 0.5 * (q[3] * w.y + q[2] * w.x - q[0] * w.z);
-    rate[2] = 0.5 * (q[3] * w.z + q[0] * w.y - q[1] * w.x);
-    rate[3] = -0.5 * (q[0] * w.x + q[1] * w.y + q[2] * w.z);
-}
-
-IVL_SIM_INLINE void rate_of(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
-                            const ivl_sim_kin_t *s, ivl_sim_kin_t *rate, ivl_sim_forces_t *forces)
+IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
+                               const ivl_sim_state_t *s, ivl_sim_rate_t *rate)
 {
     const ivl_sim_leg_model_t *leg = &model->leg;
     const double length = model->raw.leg_length_m, gravity = model->raw.world_gravity_mps2;
-    const kinematics_t k = kinematics(model, s);
-    const ivl_l3_t up = ivl_l3_set(k.up), w = ivl_l3_set(k.w), hip = leg->hip_B_m;
-    const ivl_v4_t inv_mass = ivl_v4_load(contact->inverse_mass), sliding = ivl_v4_load(contact->sliding);
-
-    // forces on the nodes of each rod: hip springs, friction of a stuck foot's joint, weight
-    const ivl_l3_t couple = hip_couple(model, &k);
-    const ivl_v4_t held = ivl_v4_select(inv_mass > 0.0, ivl_v4_set(0.0), ivl_v4_set(1.0));
-    const ivl_v4_t joint = held * (model->raw.leg_foot_damping_Nmsprad / (length * length));
-    const ivl_l3_t pair = ivl_l3_sub(couple, ivl_l3_scale(joint, k.v_rod));
-    const ivl_l3_t f_foot = ivl_l3_sub(pair, ivl_l3_scale(ivl_v4_set(leg->weight_foot_kg * gravity), up));
-
-    // what the hips would feel if neither the body nor the constraints accelerated them
-    const ivl_l3_t centripetal = ivl_l3_cross(w, ivl_l3_cross(w, hip));
-    const ivl_l3_t yield = ivl_l3_scale(
-        leg->mass_cross_kg * inv_mass,
-        along_ceiling(sliding, up, ivl_l3_sub(f_foot, ivl_l3_scale(ivl_v4_set(leg->mass_cross_kg), centripetal))));
-    const ivl_l3_t at_hip =
-        ivl_l3_add(ivl_l3_add(ivl_l3_scale(ivl_v4_set(leg->mass_hip_kg), centripetal), yield),
-                   ivl_l3_add(pair, ivl_l3_scale(ivl_v4_set(leg->weight_hip_kg * gravity), up)));
-    double b[6];
-    body_wrench(model, load, &k, s, b, forces);
-    subtract_wrench(b, ivl_l3_sum(at_hip),
-                    ivl_l3_sum(ivl_l3_add(ivl_l3_cross(hip, at_hip), ivl_l3_cross(k.rod, couple))));
-
-    // length constraints: n.(a_foot - a_hip) = -|v_rod|^2 / L - stabilisation
-    const constraint_t c = constraint(model, contact, &k);
+    const double joint = model->raw.leg_foot_damping_Nmsprad / (length * length);
     const double sigma = STABILISATION_PER_S;
-    const ivl_v4_t curvature = ivl_l3_dot(k.v_rod, k.v_rod) * (1.0 / length) + 2.0 * sigma * ivl_l3_dot(k.n, k.v_rod) +
-                               (0.5 * sigma * sigma / length) * (ivl_l3_dot(k.rod, k.rod) - length * length);
-    const ivl_v4_t target = curvature + inv_mass * ivl_l3_dot(k.n, along_ceiling(sliding, up, f_foot)) -
-                            ivl_l3_dot(c.g, centripetal);
-    double u[6];
-    ivl_v4_t axial;
+    kinematics_t k;
+    kinematics(model, s, &k);
+    ivl_wide_t b[N], r[IVL_SIM_LEGS], u[N], axial[IVL_SIM_LEGS];
+    ivl_w3_t f_foot[IVL_SIM_LEGS], centripetal[IVL_SIM_LEGS];
+    row_t rows[IVL_SIM_LEGS];
+    body_wrench(model, load, &k, s->p_WB_m.z, b, rate->overlap_m);
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_d3_t hip = leg->hip_B_m[i];
+        const ivl_wide_t inv_mass = contact->inverse_mass[i], sliding = contact->sliding[i];
+
+        // forces on the rod's ends: hip springs, friction of a stuck foot's joint, weight
+        const ivl_w3_t couple = hip_couple(model, &k, i);
+        const ivl_wide_t held = ivl_wide_select(inv_mass > 0.0, ivl_wide(0.0), ivl_wide(joint));
+        const ivl_w3_t pair = ivl_w3_plus(couple, -held, k.v_rod[i]);
+        f_foot[i] = ivl_w3_plus(pair, ivl_wide(-leg->weight_foot_kg * gravity), k.up);
+
+        // what the hip takes from the body if neither the body nor the constraint accelerated it
+        centripetal[i] = ivl_w3_cross(k.w, ivl_w3_cross_d3(k.w, hip));
+        const ivl_w3_t at_foot = ivl_w3_plus(f_foot[i], ivl_wide(-leg->mass_cross_kg), centripetal[i]);
+        const ivl_w3_t yield = ivl_w3_scale(leg->mass_cross_kg * inv_mass, along_ceiling(sliding, k.up, at_foot));
+        const ivl_w3_t weight = ivl_w3_plus(pair, ivl_wide(leg->weight_hip_kg * gravity), k.up);
+        const ivl_w3_t at_hip = ivl_w3_plus(ivl_w3_add(weight, yield), ivl_wide(leg->mass_hip_kg), centripetal[i]);
+        subtract_wrench(b, at_hip, ivl_w3_add(ivl_w3_cross_from_d3(hip, at_hip), ivl_w3_cross(k.rod[i], couple)));
+
+        // length constraint: n.(a_foot - a_hip) = -|v_rod|^2 / L - stabilisation
+        rows[i] = constraint_row(model, contact, &k, i);
+        const ivl_wide_t curvature =
+            ivl_w3_dot(k.v_rod[i], k.v_rod[i]) * (1.0 / length) + 2.0 * sigma * ivl_w3_dot(k.n[i], k.v_rod[i]) +
+            (0.5 * sigma * sigma / length) * (ivl_w3_dot(k.rod[i], k.rod[i]) - length * length);
+        r[i] = curvature + inv_mass * ivl_w3_dot(k.n[i], along_ceiling(sliding, k.up, f_foot[i])) -
+               ivl_w3_dot(rows[i].g, centripetal[i]);
+    }
+    const ivl_wide_t *inverse6 = contact->inverse_mass6;
+    ivl_wide_t rebuilt[IVL_SIM_PACKED];
     if (contact->any_sliding)
     {
-        double inverse[6][6];
-        mass_while_sliding(model, contact, k.up, inverse);
-        solve_constrained((const double(*)[6])inverse, &c, b, target, u, &axial);
+        memcpy(rebuilt, contact->inverse_mass6, sizeof rebuilt);
+        inverse_while_sliding(model, contact, &k.up, rebuilt);
+        inverse6 = rebuilt;
     }
-    else
+    solve_constrained(inverse6, (const row_t *)rows, b, r, u, axial);
+
+    // back to the feet, and to world axes
+    const ivl_w3_t a = {u[0], u[1], u[2]}, alpha = {u[3], u[4], u[5]};
+    rate->a_WB_mps2 = ivl_wrot_apply(&k.R_WB, a);
+    rate->alpha_B_radps2 = alpha;
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        solve_constrained(contact->inverse_mass6, &c, b, target, u, &axial);
-    }
-
-    // back to the nodes
-    const ivl_l3_t a_hip = ivl_l3_add(ivl_l3_add(ivl_l3_set(ivl_d3(u[0], u[1], u[2])), centripetal),
-                                      ivl_l3_cross(ivl_l3_set(ivl_d3(u[3], u[4], u[5])), hip));
-    const ivl_l3_t net = ivl_l3_sub(ivl_l3_sub(f_foot, ivl_l3_scale(axial, k.n)),
-                                    ivl_l3_scale(ivl_v4_set(leg->mass_cross_kg), a_hip));
-    const ivl_l3_t a_foot = ivl_l3_scale(inv_mass, along_ceiling(sliding, up, net));
-    const ivl_d3_t a = ivl_rot_apply(&k.R_WB, ivl_d3(u[0], u[1], u[2]));
-    memcpy(rate->p_WB_m, s->v_WB_mps, sizeof rate->p_WB_m);
-    rate->pitch_rad = -k.w.y;
-    ivl_d3_store(rate->v_WB_mps, a);
-    rate->pad_v = 0.0;
-    quaternion_rate(s->q_WB, k.w, rate->q_WB);
-    ivl_d3_store(rate->w_B_radps, ivl_d3(u[3], u[4], u[5]));
-    rate->pad_w = 0.0;
-    memcpy(rate->p_foot_W_m, s->v_foot_W_mps, sizeof rate->p_foot_W_m);
-    ivl_l3_store(rate->v_foot_W_mps, ivl_rot_apply_l3(&k.R_WB, a_foot));
-    ivl_d3_store(forces->a_WB_mps2, a);
-    ivl_v4_store(forces->pull_N, -ivl_l3_dot(up, net));
-}
-
-enum
-{
-    STATE_SIZE = sizeof(ivl_sim_kin_t) / sizeof(double)
-};
-
-IVL_SIM_INLINE void advance(const ivl_sim_kin_t *s, double dt, const ivl_sim_kin_t *rate, ivl_sim_kin_t *next)
-{
-    const double *x = (const double *)s, *r = (const double *)rate;
-    double *y = (double *)next;
-    for (int i = 0; i < STATE_SIZE; i++)
-    {
-        y[i] = x[i] + dt * r[i];
+        const ivl_w3_t a_hip = ivl_w3_add(ivl_w3_add(a, centripetal[i]), ivl_w3_cross_d3(alpha, leg->hip_B_m[i]));
+        const ivl_w3_t net = ivl_w3_plus(ivl_w3_plus(f_foot[i], -axial[i], k.n[i]), ivl_wide(-leg->mass_cross_kg), a_hip);
+        const ivl_w3_t a_foot = ivl_w3_scale(contact->inverse_mass[i], along_ceiling(contact->sliding[i], k.up, net));
+        rate->a_foot_W_mps2[i] = ivl_wrot_apply(&k.R_WB, a_foot);
+        rate->pull_N[i] = -ivl_w3_dot(k.up, net);
     }
 }
 
-IVL_SIM_INLINE void normalize(double q[4])
+// ---- integration ------------------------------------------------------------------------------------------------------
+
+/// q + h/2 q (0, w): turns q by h w, to second order; the length is corrected where it matters.
+IVL_SIM_INLINE void turn(const ivl_wide_t q[4], const ivl_wide_t along[4], ivl_wide_t h, ivl_w3_t w, ivl_wide_t out[4])
 {
-    const double s = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    const ivl_wide_t half = 0.5 * h;
+    out[0] = q[0] + half * (along[3] * w.x + along[1] * w.z - along[2] * w.y);
+    out[1] = q[1] + half * (along[3] * w.y + along[2] * w.x - along[0] * w.z);
+    out[2] = q[2] + half * (along[3] * w.z + along[0] * w.y - along[1] * w.x);
+    out[3] = q[3] - half * (along[0] * w.x + along[1] * w.y + along[2] * w.z);
+}
+
+IVL_SIM_INLINE void normalize(ivl_wide_t q[4])
+{
+    const ivl_wide_t s = 1.0 / ivl_wide_sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (int i = 0; i < 4; i++)
     {
         q[i] *= s;
     }
 }
 
-IVL_SIM_INLINE void rk4_of(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
-                           const ivl_sim_kin_t *rate, double dt, const ivl_sim_kin_t *s, ivl_sim_kin_t *next)
+IVL_SIM_INLINE void leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
+                             ivl_wide_t dt, const ivl_sim_state_t *s, const ivl_sim_rate_t *last, ivl_sim_state_t *next,
+                             ivl_sim_rate_t *rate)
 {
-    ivl_sim_kin_t stage, r[3];
-    ivl_sim_forces_t unused;
-    advance(s, 0.5 * dt, rate, &stage);
-    for (int i = 0; i < 3; i++)
-    {
-        rate_of(model, contact, load, &stage, &r[i], &unused);
-        advance(s, (i == 0) ? 0.5 * dt : dt, &r[i], &stage);
-    }
-    const double *x = (const double *)s, *r0 = (const double *)rate, *r1 = (const double *)&r[0];
-    const double *r2 = (const double *)&r[1], *r3 = (const double *)&r[2];
-    double *y = (double *)next;
-    for (int i = 0; i < STATE_SIZE; i++)
-    {
-        y[i] = x[i] + dt * (1.0 / 6.0) * (r0[i] + 2.0 * (r1[i] + r2[i]) + r3[i]);
-    }
-    normalize(next->q_WB);
-}
-
-// The same source is compiled twice, for plain x86-64 (or any other machine) and with 256-bit registers.  Both give the
-// same bits: lanes never mix, and AVX2 without FMA rounds as SSE2 does.
-#if defined(__x86_64__)
-#define IVL_SIM_HAS_AVX2 1
-
-__attribute__((target("avx2"))) static void rate_avx2(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact,
-                                                      const ivl_sim_load_t *load, const ivl_sim_kin_t *state,
-                                                      ivl_sim_kin_t *rate, ivl_sim_forces_t *forces)
-{
-    rate_of(model, contact, load, state, rate, forces);
-}
-
-__attribute__((target("avx2"))) static void rk4_avx2(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact,
-                                                     const ivl_sim_load_t *load, const ivl_sim_kin_t *rate, double dt_s,
-                                                     const ivl_sim_kin_t *state, ivl_sim_kin_t *next)
-{
-    rk4_of(model, contact, load, rate, dt_s, state, next);
-}
-#else
-#define IVL_SIM_HAS_AVX2 0
-#endif
-
-void ivl_sim_rate(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
-                  const ivl_sim_kin_t *state, ivl_sim_kin_t *rate, ivl_sim_forces_t *forces)
-{
-#if IVL_SIM_HAS_AVX2
-    if (__builtin_cpu_supports("avx2"))
-    {
-        rate_avx2(model, contact, load, state, rate, forces);
-        return;
-    }
-#endif
-    rate_of(model, contact, load, state, rate, forces);
-}
-
-void ivl_sim_rk4(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
-                 const ivl_sim_kin_t *rate, double dt_s, const ivl_sim_kin_t *state, ivl_sim_kin_t *next)
-{
-#if IVL_SIM_HAS_AVX2
-    if (__builtin_cpu_supports("avx2"))
-    {
-        rk4_avx2(model, contact, load, rate, dt_s, state, next);
-        return;
-    }
-#endif
-    rk4_of(model, contact, load, rate, dt_s, state, next);
-}
-
-void ivl_sim_impulse(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, ivl_sim_kin_t *s)
-{
-    const ivl_sim_leg_model_t *leg = &model->leg;
-    const kinematics_t k = kinematics(model, s);
-    const ivl_l3_t up = ivl_l3_set(k.up);
-    const ivl_v4_t inv_mass = ivl_v4_load(contact->inverse_mass), sliding = ivl_v4_load(contact->sliding);
-
-    // the jump of a held foot is known: all of its velocity, or the part along the normal if it slides
-    const ivl_v4_t stuck = ivl_v4_select(inv_mass > 0.0, ivl_v4_set(0.0), ivl_v4_set(1.0));
-    const ivl_l3_t jump = ivl_l3_sub(ivl_l3_scale(-stuck, k.v_foot),
-                                     ivl_l3_scale(sliding * ivl_l3_dot(up, k.v_foot), up));
-    const ivl_l3_t at_hip = ivl_l3_scale(ivl_v4_set(leg->mass_cross_kg), jump);
-    double b[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, inverse[6][6], u[6];
-    subtract_wrench(b, ivl_l3_sum(at_hip), ivl_l3_sum(ivl_l3_cross(leg->hip_B_m, at_hip)));
-    const constraint_t c = constraint(model, contact, &k);
-    ivl_v4_t axial;
-    mass_while_sliding(model, contact, k.up, inverse);
-    solve_constrained((const double(*)[6])inverse, &c, b, ivl_l3_dot(k.n, ivl_l3_add(k.v_rod, jump)), u, &axial);
-
-    const ivl_l3_t dv_hip = ivl_l3_add(ivl_l3_set(ivl_d3(u[0], u[1], u[2])),
-                                       ivl_l3_cross(ivl_l3_set(ivl_d3(u[3], u[4], u[5])), leg->hip_B_m));
-    const ivl_l3_t push = ivl_l3_add(ivl_l3_scale(axial, k.n), ivl_l3_scale(ivl_v4_set(leg->mass_cross_kg), dv_hip));
-    const ivl_l3_t dv_foot = ivl_l3_sub(jump, ivl_l3_scale(inv_mass, along_ceiling(sliding, up, push)));
-    const ivl_d3_t v = ivl_rot_apply(&k.R_WB, ivl_d3_add(k.v, ivl_d3(u[0], u[1], u[2])));
-    ivl_d3_store(s->v_WB_mps, v);
-    ivl_d3_store(s->w_B_radps, ivl_d3_add(k.w, ivl_d3(u[3], u[4], u[5])));
-    ivl_l3_store(s->v_foot_W_mps, ivl_rot_apply_l3(&k.R_WB, ivl_l3_add(k.v_foot, dv_foot)));
+    const ivl_wide_t half = 0.5 * dt;
+    ivl_sim_state_t mid;
+    mid.p_WB_m = ivl_w3_plus(s->p_WB_m, half, s->v_WB_mps);
+    mid.v_WB_mps = ivl_w3_plus(s->v_WB_mps, half, last->a_WB_mps2);
+    mid.w_B_radps = ivl_w3_plus(s->w_B_radps, half, last->alpha_B_radps2);
+    const ivl_w3_t w_quarter = ivl_w3_plus(s->w_B_radps, 0.5 * half, last->alpha_B_radps2);
+    turn(s->q_WB, s->q_WB, half, w_quarter, mid.q_WB);
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        if (contact->foot[i] == IVL_SIM_FOOT_STUCK)
-        {
-            s->v_foot_W_mps[0][i] = s->v_foot_W_mps[1][i] = s->v_foot_W_mps[2][i] = 0.0;
-        }
-        else if (contact->foot[i] == IVL_SIM_FOOT_SLIDING)
-        {
-            s->v_foot_W_mps[2][i] = 0.0;
-        }
+        mid.p_foot_W_m[i] = ivl_w3_plus(s->p_foot_W_m[i], half, s->v_foot_W_mps[i]);
+        mid.v_foot_W_mps[i] = ivl_w3_plus(s->v_foot_W_mps[i], half, last->a_foot_W_mps2[i]);
+    }
+    accelerate(model, contact, load, &mid, rate);
+    next->v_WB_mps = ivl_w3_plus(s->v_WB_mps, dt, rate->a_WB_mps2);
+    next->w_B_radps = ivl_w3_plus(s->w_B_radps, dt, rate->alpha_B_radps2);
+    next->p_WB_m = ivl_w3_plus(mid.p_WB_m, half, next->v_WB_mps);
+    const ivl_w3_t w_mean = ivl_w3_scale(ivl_wide(0.5), ivl_w3_add(s->w_B_radps, next->w_B_radps));
+    turn(s->q_WB, mid.q_WB, dt, w_mean, next->q_WB);
+    normalize(next->q_WB);
+    next->pitch_rad = s->pitch_rad - dt * w_mean.y;
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        next->v_foot_W_mps[i] = ivl_w3_plus(s->v_foot_W_mps[i], dt, rate->a_foot_W_mps2[i]);
+        next->p_foot_W_m[i] = ivl_w3_plus(mid.p_foot_W_m[i], half, next->v_foot_W_mps[i]);
     }
 }
 
-static double plate_energy(const ivl_sim_model_t *model, const kinematics_t *k, double height_m, int index)
+// The same source, for registers of 128, 256 and 512 bits.  All give the same bits: lanes never mix, and without fused
+// multiply-add every width rounds alike.
+#if defined(__x86_64__)
+#define STEP_FOR(name, isa)                                                                                            \
+    __attribute__((target(isa))) static void name(                                                                     \
+        const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,                    \
+        const ivl_wide_t *dt_s, const ivl_sim_state_t *state, const ivl_sim_rate_t *last, ivl_sim_state_t *next,       \
+        ivl_sim_rate_t *rate)                                                                                          \
+    {                                                                                                                  \
+        leapfrog(model, contact, load, *dt_s, state, last, next, rate);                                                \
+    }
+STEP_FOR(leapfrog_avx2, "avx2")
+STEP_FOR(leapfrog_avx512, "avx512f,avx512dq,prefer-vector-width=512")
+#endif
+
+void ivl_sim_leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
+                      const ivl_wide_t *dt_s, const ivl_sim_state_t *state, const ivl_sim_rate_t *last,
+                      ivl_sim_state_t *next, ivl_sim_rate_t *rate)
 {
-    const ivl_sim_plate_t *plate = &model->plate[index];
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
+    {
+        leapfrog_avx512(model, contact, load, dt_s, state, last, next, rate);
+        return;
+    }
+    if (__builtin_cpu_supports("avx2"))
+    {
+        leapfrog_avx2(model, contact, load, dt_s, state, last, next, rate);
+        return;
+    }
+#endif
+    leapfrog(model, contact, load, *dt_s, state, last, next, rate);
+}
+
+// ---- impulse, energy, momentum of one vehicle -------------------------------------------------------------------------
+
+/// The same vehicle in all lanes, to use the wide functions for one.
+static void spread(const ivl_sim_kin_t *kin, ivl_sim_state_t *state)
+{
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        ivl_sim_lane_set(state, lane, kin);
+    }
+}
+
+static ivl_d3_t first(ivl_w3_t a)
+{
+    return ivl_d3(a.x[0], a.y[0], a.z[0]);
+}
+
+void ivl_sim_impulse(const ivl_sim_model_t *model, const ivl_sim_foot_t foot[IVL_SIM_LEGS], ivl_sim_kin_t *kin)
+{
+    const ivl_sim_leg_model_t *leg = &model->leg;
+    ivl_sim_contact_t contact;
+    ivl_sim_state_t s;
+    kinematics_t k;
+    ivl_wide_t b[N] = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}}, r[IVL_SIM_LEGS], u[N], axial[IVL_SIM_LEGS];
+    ivl_w3_t jump[IVL_SIM_LEGS], v_foot[IVL_SIM_LEGS];
+    row_t rows[IVL_SIM_LEGS];
+    memset(&contact, 0, sizeof contact);
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        ivl_sim_contact_set(model, &contact, lane, foot);
+    }
+    spread(kin, &s);
+    kinematics(model, &s, &k);
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        // the jump of a held foot is known: all of its velocity, or the part along the normal if it slides
+        const double stuck = (foot[i] == IVL_SIM_FOOT_STUCK) ? 1.0 : 0.0;
+        v_foot[i] = ivl_wrot_apply_inverse(&k.R_WB, s.v_foot_W_mps[i]);
+        jump[i] = ivl_w3_plus(ivl_w3_scale(ivl_wide(-stuck), v_foot[i]), -contact.sliding[i] * ivl_w3_dot(k.up, v_foot[i]), k.up);
+        const ivl_w3_t at_hip = ivl_w3_scale(ivl_wide(leg->mass_cross_kg), jump[i]);
+        subtract_wrench(b, at_hip, ivl_w3_cross_from_d3(leg->hip_B_m[i], at_hip));
+        rows[i] = constraint_row(model, &contact, &k, i);
+        r[i] = ivl_w3_dot(k.n[i], ivl_w3_add(k.v_rod[i], jump[i]));
+    }
+    inverse_while_sliding(model, &contact, &k.up, contact.inverse_mass6);
+    solve_constrained(contact.inverse_mass6, (const row_t *)rows, b, r, u, axial);
+    const ivl_w3_t dv = {u[0], u[1], u[2]}, dw = {u[3], u[4], u[5]};
+    s.v_WB_mps = ivl_w3_add(s.v_WB_mps, ivl_wrot_apply(&k.R_WB, dv));
+    s.w_B_radps = ivl_w3_add(s.w_B_radps, dw);
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_w3_t dv_hip = ivl_w3_add(dv, ivl_w3_cross_d3(dw, leg->hip_B_m[i]));
+        const ivl_w3_t push = ivl_w3_plus(ivl_w3_scale(axial[i], k.n[i]), ivl_wide(leg->mass_cross_kg), dv_hip);
+        const ivl_w3_t yield = ivl_w3_scale(-contact.inverse_mass[i], along_ceiling(contact.sliding[i], k.up, push));
+        s.v_foot_W_mps[i] = ivl_wrot_apply(&k.R_WB, ivl_w3_add(v_foot[i], ivl_w3_add(jump[i], yield)));
+    }
+    ivl_sim_lane_get(&s, 0, kin);
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        // exactly at rest, not up to rounding
+        kin->v_foot_W_mps[i][0] = (foot[i] == IVL_SIM_FOOT_STUCK) ? 0.0 : kin->v_foot_W_mps[i][0];
+        kin->v_foot_W_mps[i][1] = (foot[i] == IVL_SIM_FOOT_STUCK) ? 0.0 : kin->v_foot_W_mps[i][1];
+        kin->v_foot_W_mps[i][2] = (foot[i] != IVL_SIM_FOOT_FREE) ? 0.0 : kin->v_foot_W_mps[i][2];
+    }
+}
+
+static double plate_energy(const ivl_sim_model_t *model, ivl_d3_t up, double height_m, int p)
+{
     double energy = 0.0;
     for (int i = 0; i < IVL_SIM_CORNERS; i++)
     {
-        const ivl_d3_t x = ivl_d3(plate->corner_B_m[0][i], plate->corner_B_m[1][i], plate->corner_B_m[2][i]);
-        const double depth = height_m + ivl_d3_dot(k->up, x) - model->raw.world_ceiling_height_m;
+        const ivl_d3_t x = model->plate[p].corner_B_m[i];
+        const double depth = height_m + ivl_d3_dot(up, x) - model->raw.world_ceiling_height_m;
         energy += (depth > 0.0) ? 0.5 * model->raw.plate_stiffness_Npm * depth * depth : 0.0;
     }
     return energy;
 }
 
-double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *s)
+double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
 {
     const ivl_sim_params_t *raw = &model->raw;
     const ivl_sim_leg_model_t *leg = &model->leg;
-    const kinematics_t k = kinematics(model, s);
-    const hinge_t h = hinge(leg, k.n);
-    const double body = 0.5 * raw->body_mass_kg * ivl_d3_dot(k.v, k.v) +
-                        0.5 * (raw->body_inertia_xx_kgm2 * k.w.x * k.w.x + raw->body_inertia_yy_kgm2 * k.w.y * k.w.y +
-                               raw->body_inertia_zz_kgm2 * k.w.z * k.w.z);
-    const ivl_v4_t rods = 0.5 * leg->mass_hip_kg * ivl_l3_dot(k.v_hip, k.v_hip) +
-                          leg->mass_cross_kg * ivl_l3_dot(k.v_hip, k.v_foot) +
-                          0.5 * leg->mass_foot_kg * ivl_l3_dot(k.v_foot, k.v_foot);
-    const ivl_v4_t springs = 0.5 * raw->leg_stiffness_Nmprad * (h.alpha * h.alpha + h.beta * h.beta);
-    const ivl_v4_t hip_height = s->p_WB_m[2] + ivl_l3_dot(leg->hip_B_m, ivl_l3_set(k.up));
-    const ivl_v4_t weights = leg->weight_hip_kg * hip_height + leg->weight_foot_kg * ivl_v4_load(s->p_foot_W_m[2]);
-    return body + ivl_v4_sum(rods + springs) +
-           raw->world_gravity_mps2 * (raw->body_mass_kg * s->p_WB_m[2] + ivl_v4_sum(weights)) +
-           plate_energy(model, &k, s->p_WB_m[2], IVL_SIM_PROP_PLATE) +
-           plate_energy(model, &k, s->p_WB_m[2], IVL_SIM_BASE_PLATE);
-}
-
-void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *s, double linear[3], double angular[3])
-{
-    const ivl_sim_params_t *raw = &model->raw;
-    const ivl_sim_leg_model_t *leg = &model->leg;
-    const kinematics_t k = kinematics(model, s);
-    const ivl_d3_t p = ivl_d3_load(s->p_WB_m);
-    const ivl_d3_t mv = ivl_d3_scale(raw->body_mass_kg, ivl_d3_load(s->v_WB_mps));
-    const ivl_d3_t spin = ivl_rot_apply(&k.R_WB, ivl_d3(raw->body_inertia_xx_kgm2 * k.w.x, raw->body_inertia_yy_kgm2 * k.w.y,
-                                                        raw->body_inertia_zz_kgm2 * k.w.z));
-    ivl_d3_t l = mv, a = ivl_d3_add(spin, ivl_d3_cross(p, mv));
+    ivl_sim_state_t s;
+    kinematics_t k;
+    spread(kin, &s);
+    kinematics(model, &s, &k);
+    const ivl_d3_t v = first(k.v), w = first(k.w), up = first(k.up);
+    double energy = 0.5 * raw->body_mass_kg * ivl_d3_dot(v, v) +
+                    0.5 * (raw->body_inertia_xx_kgm2 * w.x * w.x + raw->body_inertia_yy_kgm2 * w.y * w.y +
+                           raw->body_inertia_zz_kgm2 * w.z * w.z) +
+                    raw->body_mass_kg * raw->world_gravity_mps2 * kin->p_WB_m[2];
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        const ivl_d3_t v_hip = ivl_rot_apply(&k.R_WB, ivl_l3_lane(k.v_hip, i));
-        const ivl_d3_t p_hip = ivl_d3_add(p, ivl_rot_apply(&k.R_WB, ivl_l3_lane(leg->hip_B_m, i)));
-        const ivl_d3_t v_foot = ivl_d3(s->v_foot_W_mps[0][i], s->v_foot_W_mps[1][i], s->v_foot_W_mps[2][i]);
-        const ivl_d3_t p_foot = ivl_d3(s->p_foot_W_m[0][i], s->p_foot_W_m[1][i], s->p_foot_W_m[2][i]);
-        const ivl_d3_t l_hip =
-            ivl_d3_add(ivl_d3_scale(leg->mass_hip_kg, v_hip), ivl_d3_scale(leg->mass_cross_kg, v_foot));
+        const hinge_t h = hinge(leg, i, k.n[i]);
+        const ivl_d3_t v_hip = ivl_d3_add(v, ivl_d3_cross(w, leg->hip_B_m[i]));
+        const ivl_d3_t v_foot = ivl_d3_add(v_hip, first(k.v_rod[i]));
+        const double hip_height = kin->p_WB_m[2] + ivl_d3_dot(leg->hip_B_m[i], up);
+        energy += 0.5 * leg->mass_hip_kg * ivl_d3_dot(v_hip, v_hip) + leg->mass_cross_kg * ivl_d3_dot(v_hip, v_foot) +
+                  0.5 * leg->mass_foot_kg * ivl_d3_dot(v_foot, v_foot) +
+                  0.5 * raw->leg_stiffness_Nmprad * (h.alpha[0] * h.alpha[0] + h.beta[0] * h.beta[0]) +
+                  raw->world_gravity_mps2 *
+                      (leg->weight_hip_kg * hip_height + leg->weight_foot_kg * kin->p_foot_W_m[i][2]);
+    }
+    return energy + plate_energy(model, up, kin->p_WB_m[2], IVL_SIM_PROP_PLATE) +
+           plate_energy(model, up, kin->p_WB_m[2], IVL_SIM_BASE_PLATE);
+}
+
+void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, double linear[3], double angular[3])
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    const ivl_sim_leg_model_t *leg = &model->leg;
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    const ivl_d3_t p = ivl_d3_load(kin->p_WB_m), v = ivl_d3_load(kin->v_WB_mps), w = ivl_d3_load(kin->w_B_radps);
+    const ivl_d3_t spin = ivl_d3(raw->body_inertia_xx_kgm2 * w.x, raw->body_inertia_yy_kgm2 * w.y,
+                                 raw->body_inertia_zz_kgm2 * w.z);
+    ivl_d3_t l = ivl_d3_scale(raw->body_mass_kg, v);
+    ivl_d3_t a = ivl_d3_add(ivl_rot_apply(&R, spin), ivl_d3_cross(p, l));
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_d3_t hip = leg->hip_B_m[i];
+        const ivl_d3_t v_hip = ivl_d3_add(v, ivl_rot_apply(&R, ivl_d3_cross(w, hip)));
+        const ivl_d3_t p_hip = ivl_d3_add(p, ivl_rot_apply(&R, hip));
+        const ivl_d3_t v_foot = ivl_d3_load(kin->v_foot_W_mps[i]), p_foot = ivl_d3_load(kin->p_foot_W_m[i]);
+        const ivl_d3_t l_hip = ivl_d3_add(ivl_d3_scale(leg->mass_hip_kg, v_hip), ivl_d3_scale(leg->mass_cross_kg, v_foot));
         const ivl_d3_t l_foot =
             ivl_d3_add(ivl_d3_scale(leg->mass_cross_kg, v_hip), ivl_d3_scale(leg->mass_foot_kg, v_foot));
         l = ivl_d3_add(l, ivl_d3_add(l_hip, l_foot));
@@ -625,8 +687,11 @@ void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *s, doub
     ivl_d3_store(angular, a);
 }
 
-double ivl_sim_plate_overlap(const ivl_sim_model_t *model, const ivl_sim_kin_t *s, int plate)
+double ivl_sim_plate_overlap(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, int plate)
 {
-    const ivl_rot_t R = ivl_rot_from_quat(s->q_WB);
-    return s->p_WB_m[2] + plate_top(&model->plate[plate], R.row[2]) - model->raw.world_ceiling_height_m;
+    const ivl_sim_plate_t *p = &model->plate[plate];
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    const ivl_d3_t up = R.row[2];
+    return kin->p_WB_m[2] + fabs(up.x) * p->half_m[0] + fabs(up.y) * p->half_m[1] + fabs(up.z) * p->half_m[2] +
+           up.z * p->center_z_m - model->raw.world_ceiling_height_m;
 }

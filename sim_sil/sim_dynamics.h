@@ -1,26 +1,34 @@
 /// @file sim_dynamics.h
-/// Rigid body with four articulated legs: accelerations, impulses of a sticking foot, energy, one Runge-Kutta step.
+/// Rigid body with four articulated legs: accelerations, the impulse of a sticking foot, energy, momentum.
 ///
 /// Coordinates: pose and velocity of the body, and position and velocity of each foot; one length constraint a leg.  A
 /// stuck foot is a foot of infinite mass: its inverse mass is set to zero, and the same equations hold.  [MODEL sec. 4]
+/// Eight rollouts stand side by side in the lanes of each number.
 #ifndef IVL_SIM_DYNAMICS_H
 #define IVL_SIM_DYNAMICS_H
 
 #include "sim_model.h"
 
-/// Everything that is integrated.  40 doubles, so that a Runge-Kutta stage is ten four-lane operations.
+/// State of eight vehicles; W world axes, B body axes.
 typedef struct
 {
-    double p_WB_m[3];
-    double pitch_rad; ///< nose-up rotation about b_y, unwrapped: the integral of -w_y
-    double v_WB_mps[3];
-    double pad_v;
-    double q_WB[4]; ///< x, y, z, w
-    double w_B_radps[3];
-    double pad_w;
-    double p_foot_W_m[3][IVL_SIM_LEGS];
-    double v_foot_W_mps[3][IVL_SIM_LEGS];
+    ivl_w3_t p_WB_m;
+    ivl_w3_t v_WB_mps;
+    ivl_w3_t w_B_radps;
+    ivl_wide_t q_WB[4];   ///< x, y, z, w
+    ivl_wide_t pitch_rad; ///< nose-up rotation about b_y, unwrapped: the integral of -w_y
+    ivl_w3_t p_foot_W_m[IVL_SIM_LEGS];
+    ivl_w3_t v_foot_W_mps[IVL_SIM_LEGS];
+} ivl_sim_state_t;
+
+/// State of one vehicle.  The same numbers in the same order: lane i of an ivl_sim_state_t is one of these.
+typedef struct
+{
+    double p_WB_m[3], v_WB_mps[3], w_B_radps[3], q_WB[4], pitch_rad;
+    double p_foot_W_m[IVL_SIM_LEGS][3], v_foot_W_mps[IVL_SIM_LEGS][3];
 } ivl_sim_kin_t;
+
+_Static_assert(sizeof(ivl_sim_state_t) == IVL_SIM_LANES * sizeof(ivl_sim_kin_t), "a lane is a vehicle");
 
 typedef enum
 {
@@ -29,54 +37,64 @@ typedef enum
     IVL_SIM_FOOT_STUCK,
 } ivl_sim_foot_t;
 
-/// Which feet hold on, and what follows from it.  Rebuilt by ivl_sim_contact_set() at an event, constant in between.
+enum
+{
+    IVL_SIM_PACKED = 21 ///< upper triangle of a symmetric 6 x 6 matrix, row by row
+};
+
+/// Which feet hold on, and what follows from it.  Changes at an event only.
 typedef struct
 {
-    ivl_sim_foot_t foot[IVL_SIM_LEGS];
-    double inverse_mass[IVL_SIM_LEGS]; ///< of the foot node, 1/kg; 0 when stuck
-    double sliding[IVL_SIM_LEGS];      ///< 1 for a sliding foot, else 0
-    bool any_sliding;
-    double mass[6][6];         ///< body and hip ends of the legs, about the body origin, body axes
-    double inverse_mass6[6][6]; ///< of `mass`
+    ivl_wide_t inverse_mass[IVL_SIM_LEGS];  ///< of the foot, 1/kg; 0 when stuck
+    ivl_wide_t sliding[IVL_SIM_LEGS];       ///< 1 for a sliding foot, else 0
+    ivl_wide_t mass6[IVL_SIM_PACKED];       ///< body and hip ends of the legs, about the body origin, body axes
+    ivl_wide_t inverse_mass6[IVL_SIM_PACKED];
+    bool any_sliding;                       ///< in any lane
 } ivl_sim_contact_t;
 
 /// Forces that are constant during one step.
 typedef struct
 {
-    double thrust_N;          ///< along body z, at the body origin
-    double torque_B_Nm[3];
+    ivl_wide_t thrust_N; ///< along body z
+    ivl_w3_t torque_B_Nm;
 } ivl_sim_load_t;
 
-/// What an evaluation finds besides the accelerations.
+/// Accelerations, and what else an evaluation finds.
 typedef struct
 {
-    double a_WB_mps2[3];                 ///< of the body origin, world axes
-    double pull_N[IVL_SIM_LEGS];         ///< pull of a held foot away from the ceiling; < 0 presses
-    bool plate_touches[IVL_SIM_PLATES];
-} ivl_sim_forces_t;
+    ivl_w3_t a_WB_mps2;
+    ivl_w3_t alpha_B_radps2;
+    ivl_w3_t a_foot_W_mps2[IVL_SIM_LEGS];
+    ivl_wide_t pull_N[IVL_SIM_LEGS];          ///< pull of a held foot away from the ceiling; < 0 presses
+    ivl_wide_t overlap_m[IVL_SIM_PLATES];     ///< highest point of a plate above the ceiling; > 0 presses
+} ivl_sim_rate_t;
 
-void ivl_sim_contact_init(const ivl_sim_model_t *model, ivl_sim_contact_t *contact);
-void ivl_sim_contact_set(const ivl_sim_model_t *model, ivl_sim_contact_t *contact, int leg, ivl_sim_foot_t foot);
+void ivl_sim_lane_get(const ivl_sim_state_t *state, int lane, ivl_sim_kin_t *kin);
+void ivl_sim_lane_set(ivl_sim_state_t *state, int lane, const ivl_sim_kin_t *kin);
 
-/// Time derivative of the state.  `rate` has the layout of the state.                         [MODEL eq. 4.9 - 4.12]
-void ivl_sim_rate(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
-                  const ivl_sim_kin_t *state, ivl_sim_kin_t *rate, ivl_sim_forces_t *forces);
+/// Tells lane `lane` which feet hold on.
+void ivl_sim_contact_set(const ivl_sim_model_t *model, ivl_sim_contact_t *contact, int lane,
+                         const ivl_sim_foot_t foot[IVL_SIM_LEGS]);
 
-/// One classical Runge-Kutta step of length dt_s; `rate` is ivl_sim_rate() at the start.
-void ivl_sim_rk4(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
-                 const ivl_sim_kin_t *rate, double dt_s, const ivl_sim_kin_t *state, ivl_sim_kin_t *next);
+/// One step of every lane, each of its own length: leapfrog with one evaluation, at the middle of the step, with the
+/// velocities there predicted from the last one.  dt = 0 evaluates without moving, to begin.     [MODEL eq. 7.1 - 7.5]
+/// @param[in] last   of the lane's previous step, or of a step of length 0 after a discontinuity
+/// @param[out] next, rate
+void ivl_sim_leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
+                      const ivl_wide_t *dt_s, const ivl_sim_state_t *state, const ivl_sim_rate_t *last,
+                      ivl_sim_state_t *next, ivl_sim_rate_t *rate);
 
-/// Velocities after feet of `contact` that move are brought to rest at once, without rebound: the projection of the
-/// motion, in the metric of the kinetic energy, on what the new constraints allow.             [MODEL eq. 4.14]
-void ivl_sim_impulse(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, ivl_sim_kin_t *state);
+/// Velocities after held feet that still move are brought to rest at once, without rebound: the projection of the
+/// motion, in the metric of the kinetic energy, on what the constraints allow.                   [MODEL eq. 4.14]
+void ivl_sim_impulse(const ivl_sim_model_t *model, const ivl_sim_foot_t foot[IVL_SIM_LEGS], ivl_sim_kin_t *kin);
 
-/// Kinetic, gravitational and elastic energy, J.                                               [MODEL eq. 4.15]
-double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *state);
+/// Kinetic, gravitational and elastic energy, J.                                                 [MODEL eq. 4.15]
+double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin);
 
-/// Linear momentum (3) and angular momentum about the world's origin (3), SI.
-void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *state, double linear[3], double angular[3]);
+/// Linear momentum, and angular momentum about the world's origin, SI.
+void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, double linear[3], double angular[3]);
 
-/// Height of the highest point of a plate minus that of the ceiling: > 0 while it presses.
-double ivl_sim_plate_overlap(const ivl_sim_model_t *model, const ivl_sim_kin_t *state, int plate);
+/// Height of the highest point of a plate above the ceiling's surface: > 0 while it presses.
+double ivl_sim_plate_overlap(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, int plate);
 
 #endif // IVL_SIM_DYNAMICS_H

@@ -1,5 +1,5 @@
 /// @file sim_math.h
-/// Scalar, vector and four-lane arithmetic of the simulator.
+/// Scalar, vector and eight-lane arithmetic of the simulator.
 ///
 /// Only + - * / and sqrt, which IEEE 754 rounds correctly everywhere, so that a rollout has the same bits on every host:
 /// the functions of libm differ between C libraries.  Double precision, SI, radians.  Pure, no state.
@@ -7,6 +7,7 @@
 #define IVL_SIM_MATH_H
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -17,9 +18,16 @@
 
 static const double IVL_SIM_PI = 3.14159265358979323846;
 
-/// Four doubles, one a leg.  Lanes never mix except where a sum over the legs is written out.
-typedef double ivl_v4_t __attribute__((vector_size(32)));
-typedef int64_t ivl_m4_t __attribute__((vector_size(32))); ///< comparison result: all bits set, or none
+
+enum
+{
+    IVL_SIM_LANES = 8 ///< rollouts that are stepped together
+};
+
+/// One number of each of eight rollouts.  Every operation acts on each lane alone, so a lane's bits do not depend on its
+/// neighbours, and the same source serves registers of any width.
+typedef double ivl_wide_t __attribute__((vector_size(8 * IVL_SIM_LANES)));
+typedef int64_t ivl_mask_t __attribute__((vector_size(8 * IVL_SIM_LANES))); ///< comparison: all bits set, or none
 
 typedef struct
 {
@@ -98,115 +106,125 @@ IVL_SIM_INLINE ivl_d3_t ivl_rot_apply_inverse(const ivl_rot_t *R, ivl_d3_t a)
                       ivl_d3_scale(a.z, R->row[2]));
 }
 
-/// Three components of a vector per leg.
+IVL_SIM_INLINE ivl_wide_t ivl_wide(double a)
+{
+    return (ivl_wide_t){a, a, a, a, a, a, a, a};
+}
+
+IVL_SIM_INLINE ivl_wide_t ivl_wide_sqrt(ivl_wide_t a)
+{
+    ivl_wide_t r;
+    for (int i = 0; i < IVL_SIM_LANES; i++)
+    {
+        r[i] = sqrt(a[i]);
+    }
+    return r;
+}
+
+IVL_SIM_INLINE ivl_wide_t ivl_wide_select(ivl_mask_t m, ivl_wide_t yes, ivl_wide_t no)
+{
+    return (ivl_wide_t)((m & (ivl_mask_t)yes) | (~m & (ivl_mask_t)no));
+}
+
+IVL_SIM_INLINE ivl_wide_t ivl_wide_abs(ivl_wide_t a)
+{
+    return (ivl_wide_t)((ivl_mask_t)a & 0x7fffffffffffffffLL);
+}
+
+IVL_SIM_INLINE bool ivl_mask_any(ivl_mask_t m)
+{
+    int64_t any = 0;
+    for (int i = 0; i < IVL_SIM_LANES; i++)
+    {
+        any |= m[i];
+    }
+    return any != 0;
+}
+
+/// A vector of each of eight rollouts.
 typedef struct
 {
-    ivl_v4_t x, y, z;
-} ivl_l3_t;
+    ivl_wide_t x, y, z;
+} ivl_w3_t;
 
-IVL_SIM_INLINE ivl_v4_t ivl_v4_load(const double a[4])
+IVL_SIM_INLINE ivl_w3_t ivl_w3_of(ivl_d3_t a)
 {
-    ivl_v4_t v;
-    memcpy(&v, a, sizeof v);
-    return v;
+    return (ivl_w3_t){ivl_wide(a.x), ivl_wide(a.y), ivl_wide(a.z)};
 }
 
-IVL_SIM_INLINE void ivl_v4_store(double a[4], ivl_v4_t v)
+IVL_SIM_INLINE ivl_w3_t ivl_w3_add(ivl_w3_t a, ivl_w3_t b)
 {
-    memcpy(a, &v, sizeof v);
+    return (ivl_w3_t){a.x + b.x, a.y + b.y, a.z + b.z};
 }
 
-IVL_SIM_INLINE ivl_v4_t ivl_v4_set(double a)
+IVL_SIM_INLINE ivl_w3_t ivl_w3_sub(ivl_w3_t a, ivl_w3_t b)
 {
-    return (ivl_v4_t){a, a, a, a};
+    return (ivl_w3_t){a.x - b.x, a.y - b.y, a.z - b.z};
 }
 
-IVL_SIM_INLINE ivl_v4_t ivl_v4_sqrt(ivl_v4_t a)
+IVL_SIM_INLINE ivl_w3_t ivl_w3_scale(ivl_wide_t s, ivl_w3_t a)
 {
-    return (ivl_v4_t){sqrt(a[0]), sqrt(a[1]), sqrt(a[2]), sqrt(a[3])};
+    return (ivl_w3_t){s * a.x, s * a.y, s * a.z};
 }
 
-IVL_SIM_INLINE ivl_v4_t ivl_v4_select(ivl_m4_t m, ivl_v4_t yes, ivl_v4_t no)
+/// a + s b
+IVL_SIM_INLINE ivl_w3_t ivl_w3_plus(ivl_w3_t a, ivl_wide_t s, ivl_w3_t b)
 {
-    return (ivl_v4_t)((m & (ivl_m4_t)yes) | (~m & (ivl_m4_t)no));
+    return (ivl_w3_t){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
 }
 
-IVL_SIM_INLINE ivl_v4_t ivl_v4_abs(ivl_v4_t a)
-{
-    return (ivl_v4_t)((ivl_m4_t)a & 0x7fffffffffffffffLL);
-}
-
-IVL_SIM_INLINE double ivl_v4_sum(ivl_v4_t a)
-{
-    return (a[0] + a[1]) + (a[2] + a[3]);
-}
-
-IVL_SIM_INLINE ivl_l3_t ivl_l3_load(const double a[3][4])
-{
-    return (ivl_l3_t){ivl_v4_load(a[0]), ivl_v4_load(a[1]), ivl_v4_load(a[2])};
-}
-
-IVL_SIM_INLINE void ivl_l3_store(double a[3][4], ivl_l3_t v)
-{
-    ivl_v4_store(a[0], v.x);
-    ivl_v4_store(a[1], v.y);
-    ivl_v4_store(a[2], v.z);
-}
-
-IVL_SIM_INLINE ivl_l3_t ivl_l3_set(ivl_d3_t a)
-{
-    return (ivl_l3_t){ivl_v4_set(a.x), ivl_v4_set(a.y), ivl_v4_set(a.z)};
-}
-
-IVL_SIM_INLINE ivl_l3_t ivl_l3_add(ivl_l3_t a, ivl_l3_t b)
-{
-    return (ivl_l3_t){a.x + b.x, a.y + b.y, a.z + b.z};
-}
-
-IVL_SIM_INLINE ivl_l3_t ivl_l3_sub(ivl_l3_t a, ivl_l3_t b)
-{
-    return (ivl_l3_t){a.x - b.x, a.y - b.y, a.z - b.z};
-}
-
-IVL_SIM_INLINE ivl_l3_t ivl_l3_scale(ivl_v4_t s, ivl_l3_t a)
-{
-    return (ivl_l3_t){s * a.x, s * a.y, s * a.z};
-}
-
-IVL_SIM_INLINE ivl_v4_t ivl_l3_dot(ivl_l3_t a, ivl_l3_t b)
+IVL_SIM_INLINE ivl_wide_t ivl_w3_dot(ivl_w3_t a, ivl_w3_t b)
 {
     return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
-IVL_SIM_INLINE ivl_l3_t ivl_l3_cross(ivl_l3_t a, ivl_l3_t b)
+/// dot and cross product with a vector that is the same in all lanes
+IVL_SIM_INLINE ivl_wide_t ivl_w3_dot_d3(ivl_w3_t a, ivl_d3_t b)
 {
-    return (ivl_l3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
-IVL_SIM_INLINE ivl_d3_t ivl_l3_sum(ivl_l3_t a)
+IVL_SIM_INLINE ivl_w3_t ivl_w3_cross(ivl_w3_t a, ivl_w3_t b)
 {
-    return ivl_d3(ivl_v4_sum(a.x), ivl_v4_sum(a.y), ivl_v4_sum(a.z));
+    return (ivl_w3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-IVL_SIM_INLINE ivl_d3_t ivl_l3_lane(ivl_l3_t a, int leg)
+IVL_SIM_INLINE ivl_w3_t ivl_w3_cross_d3(ivl_w3_t a, ivl_d3_t b)
 {
-    return ivl_d3(a.x[leg], a.y[leg], a.z[leg]);
+    return (ivl_w3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// world to body, lane by lane
-IVL_SIM_INLINE ivl_l3_t ivl_rot_apply_inverse_l3(const ivl_rot_t *R, ivl_l3_t a)
+IVL_SIM_INLINE ivl_w3_t ivl_w3_cross_from_d3(ivl_d3_t a, ivl_w3_t b)
 {
-    const ivl_d3_t *r = R->row;
-    return (ivl_l3_t){r[0].x * a.x + r[1].x * a.y + r[2].x * a.z, r[0].y * a.x + r[1].y * a.y + r[2].y * a.z,
-                      r[0].z * a.x + r[1].z * a.y + r[2].z * a.z};
+    return (ivl_w3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// body to world, lane by lane
-IVL_SIM_INLINE ivl_l3_t ivl_rot_apply_l3(const ivl_rot_t *R, ivl_l3_t a)
+/// Rotation matrices body to world, by rows.
+typedef struct
 {
-    const ivl_d3_t *r = R->row;
-    return (ivl_l3_t){r[0].x * a.x + r[0].y * a.y + r[0].z * a.z, r[1].x * a.x + r[1].y * a.y + r[1].z * a.z,
-                      r[2].x * a.x + r[2].y * a.y + r[2].z * a.z};
+    ivl_w3_t row[3];
+} ivl_wrot_t;
+
+IVL_SIM_INLINE ivl_wrot_t ivl_wrot_from_quat(const ivl_wide_t q[4])
+{
+    const ivl_wide_t x = q[0], y = q[1], z = q[2], w = q[3];
+    const ivl_wide_t s = 2.0 / (x * x + y * y + z * z + w * w);
+    const ivl_wide_t xs = x * s, ys = y * s, zs = z * s;
+    ivl_wrot_t R;
+    R.row[0] = (ivl_w3_t){1.0 - (y * ys + z * zs), x * ys - w * zs, x * zs + w * ys};
+    R.row[1] = (ivl_w3_t){x * ys + w * zs, 1.0 - (x * xs + z * zs), y * zs - w * xs};
+    R.row[2] = (ivl_w3_t){x * zs - w * ys, y * zs + w * xs, 1.0 - (x * xs + y * ys)};
+    return R;
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_wrot_apply(const ivl_wrot_t *R, ivl_w3_t a)
+{
+    return (ivl_w3_t){ivl_w3_dot(R->row[0], a), ivl_w3_dot(R->row[1], a), ivl_w3_dot(R->row[2], a)};
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_wrot_apply_inverse(const ivl_wrot_t *R, ivl_w3_t a)
+{
+    return ivl_w3_plus(ivl_w3_plus(ivl_w3_scale(a.x, R->row[0]), a.y, R->row[1]), a.z, R->row[2]);
 }
 
 // Polynomials below: interpolation of the function at Chebyshev nodes, computed with 40 digits; the stated error is that
@@ -234,33 +252,33 @@ static const double IVL_SIM_ATANH[8] = {0.99999999999999999887, 0.33333333333333
                                         0.14285714380320839941, 0.11111098528363023304, 0.090918158401146644019,
                                         0.07656264074182095483, 0.074048551803276383491};
 
-/// Angle of the point (c, s) from the first axis, four lanes, in [-pi, pi].
-IVL_SIM_INLINE ivl_v4_t ivl_v4_atan2(ivl_v4_t s, ivl_v4_t c)
+/// Angle of the point (c, s) from the first axis, in [-pi, pi].
+IVL_SIM_INLINE ivl_wide_t ivl_wide_atan2(ivl_wide_t s, ivl_wide_t c)
 {
-    const ivl_v4_t zero = ivl_v4_set(0.0);
-    const ivl_v4_t abs_s = ivl_v4_abs(s), abs_c = ivl_v4_abs(c);
+    const ivl_wide_t zero = ivl_wide(0.0);
+    const ivl_wide_t abs_s = ivl_wide_abs(s), abs_c = ivl_wide_abs(c);
     // first octant: t = lo/hi in [0, 1]; beyond tan(pi/8) turn by pi/4: t = (lo - hi)/(lo + hi)
-    const ivl_m4_t swap = abs_s > abs_c;
-    const ivl_v4_t lo = ivl_v4_select(swap, abs_c, abs_s);
-    const ivl_v4_t hi = ivl_v4_select(swap, abs_s, abs_c);
-    const ivl_m4_t turn = lo > 0.41421356237309504880 * hi;
-    const ivl_v4_t den = ivl_v4_select(turn, lo + hi, hi);
-    const ivl_v4_t t = ivl_v4_select(turn, lo - hi, lo) / ivl_v4_select(den > zero, den, ivl_v4_set(1.0));
-    const ivl_v4_t u = t * t;
-    ivl_v4_t p = ivl_v4_set(IVL_SIM_ATAN[10]);
+    const ivl_mask_t swap = abs_s > abs_c;
+    const ivl_wide_t lo = ivl_wide_select(swap, abs_c, abs_s);
+    const ivl_wide_t hi = ivl_wide_select(swap, abs_s, abs_c);
+    const ivl_mask_t turn = lo > 0.41421356237309504880 * hi;
+    const ivl_wide_t den = ivl_wide_select(turn, lo + hi, hi);
+    const ivl_wide_t t = ivl_wide_select(turn, lo - hi, lo) / ivl_wide_select(den > zero, den, ivl_wide(1.0));
+    const ivl_wide_t u = t * t;
+    ivl_wide_t p = ivl_wide(IVL_SIM_ATAN[10]);
     for (int k = 9; k >= 0; k--)
     {
         p = p * u + IVL_SIM_ATAN[k];
     }
-    p = p * t + ivl_v4_select(turn, ivl_v4_set(0.25 * IVL_SIM_PI), zero);
-    p = ivl_v4_select(swap, 0.5 * IVL_SIM_PI - p, p);
-    p = ivl_v4_select(c < zero, IVL_SIM_PI - p, p);
-    return ivl_v4_select(s < zero, -p, p);
+    p = p * t + ivl_wide_select(turn, ivl_wide(0.25 * IVL_SIM_PI), zero);
+    p = ivl_wide_select(swap, 0.5 * IVL_SIM_PI - p, p);
+    p = ivl_wide_select(c < zero, IVL_SIM_PI - p, p);
+    return ivl_wide_select(s < zero, -p, p);
 }
 
 IVL_SIM_INLINE double ivl_sim_atan2(double s, double c)
 {
-    return ivl_v4_atan2(ivl_v4_set(s), ivl_v4_set(c))[0];
+    return ivl_wide_atan2(ivl_wide(s), ivl_wide(c))[0];
 }
 
 IVL_SIM_INLINE double ivl_sim_polynomial(const double *coefficient, int n, double x)

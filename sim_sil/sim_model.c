@@ -45,18 +45,10 @@ static void derive_legs(ivl_sim_model_t *model)
     {
         // outward direction of the leg's vertical plane
         const double ox = SIGN_X[i] * sqrt(0.5), oy = SIGN_Y[i] * sqrt(0.5);
-        leg->hip_B_m.x[i] = SIGN_X[i] * raw->leg_hip_xy_m;
-        leg->hip_B_m.y[i] = SIGN_Y[i] * raw->leg_hip_xy_m;
-        leg->hip_B_m.z[i] = raw->leg_hip_z_m;
-        leg->rest_B.x[i] = sin_psi * ox;
-        leg->rest_B.y[i] = sin_psi * oy;
-        leg->rest_B.z[i] = -cos_psi;
-        leg->inplane_B.x[i] = cos_psi * ox;
-        leg->inplane_B.y[i] = cos_psi * oy;
-        leg->inplane_B.z[i] = sin_psi;
-        leg->sideways_B.x[i] = -oy;
-        leg->sideways_B.y[i] = ox;
-        leg->sideways_B.z[i] = 0.0;
+        leg->hip_B_m[i] = ivl_d3(SIGN_X[i] * raw->leg_hip_xy_m, SIGN_Y[i] * raw->leg_hip_xy_m, raw->leg_hip_z_m);
+        leg->rest_B[i] = ivl_d3(sin_psi * ox, sin_psi * oy, -cos_psi);
+        leg->inplane_B[i] = ivl_d3(cos_psi * ox, cos_psi * oy, sin_psi);
+        leg->sideways_B[i] = ivl_d3(-oy, ox, 0.0);
     }
     leg->mass_hip_kg = raw->leg_mass_kg / 3.0;
     leg->mass_cross_kg = raw->leg_mass_kg / 6.0;
@@ -78,22 +70,22 @@ static void derive_plate(ivl_sim_plate_t *plate, double size_x, double size_y, d
     plate->center_z_m = center_z;
     for (int i = 0; i < IVL_SIM_CORNERS; i++)
     {
-        plate->corner_B_m[0][i] = (i & 1) ? plate->half_m[0] : -plate->half_m[0];
-        plate->corner_B_m[1][i] = (i & 2) ? plate->half_m[1] : -plate->half_m[1];
-        plate->corner_B_m[2][i] = center_z + ((i & 4) ? plate->half_m[2] : -plate->half_m[2]);
+        plate->corner_B_m[i] = ivl_d3((i & 1) ? plate->half_m[0] : -plate->half_m[0],
+                                      (i & 2) ? plate->half_m[1] : -plate->half_m[1],
+                                      center_z + ((i & 4) ? plate->half_m[2] : -plate->half_m[2]));
     }
 }
 
 static double reach(const ivl_sim_model_t *model)
 {
-    const ivl_d3_t hip = ivl_l3_lane(model->leg.hip_B_m, 0);
+    const ivl_d3_t hip = model->leg.hip_B_m[0];
     double farthest = sqrt(ivl_d3_dot(hip, hip)) + model->raw.leg_length_m + model->raw.leg_foot_radius_m;
     for (int p = 0; p < IVL_SIM_PLATES; p++)
     {
         for (int i = 0; i < IVL_SIM_CORNERS; i++)
         {
-            const double(*c)[IVL_SIM_CORNERS] = model->plate[p].corner_B_m;
-            const double distance = sqrt(c[0][i] * c[0][i] + c[1][i] * c[1][i] + c[2][i] * c[2][i]);
+            const ivl_d3_t corner = model->plate[p].corner_B_m[i];
+            const double distance = sqrt(ivl_d3_dot(corner, corner));
             farthest = (distance > farthest) ? distance : farthest;
         }
     }

@@ -25,8 +25,8 @@ enum
 
 typedef struct
 {
-    double corner_B_m[3][IVL_SIM_CORNERS]; ///< x, y, z of the eight corners
-    double half_m[3];                      ///< half sizes
+    ivl_d3_t corner_B_m[IVL_SIM_CORNERS];
+    double half_m[3]; ///< half sizes
     double center_z_m;
 } ivl_sim_plate_t;
 
@@ -34,10 +34,10 @@ typedef struct
 /// rigid rod: kinetic energy = (hip v_h^2 + 2 cross v_h.v_f + foot v_f^2) / 2.              [MODEL eq. 4.1]
 typedef struct
 {
-    ivl_l3_t hip_B_m;        ///< pivots
-    ivl_l3_t rest_B;         ///< unit vector of the leg at rest
-    ivl_l3_t inplane_B;      ///< unit vector in the leg's vertical plane, direction of growing psi
-    ivl_l3_t sideways_B;     ///< unit vector across that plane, axis of the first hinge
+    ivl_d3_t hip_B_m[IVL_SIM_LEGS];    ///< pivots
+    ivl_d3_t rest_B[IVL_SIM_LEGS];     ///< unit vector of the leg at rest
+    ivl_d3_t inplane_B[IVL_SIM_LEGS];  ///< unit vector in the leg's vertical plane, direction of growing psi
+    ivl_d3_t sideways_B[IVL_SIM_LEGS]; ///< unit vector across that plane, axis of the first hinge
     double mass_hip_kg;      ///< m / 3
     double mass_cross_kg;    ///< m / 6
     double mass_foot_kg;     ///< m / 3 + foot

@@ -26,18 +26,19 @@ static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t 
     }
 }
 
-static void request_approach(const ivl_sim_spec_t *spec, ivl_sim_world_t *world)
+static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], ivl_command_t *cmd)
 {
-    ivl_command_t *cmd = &world->in.cmd;
     cmd->request = IVL_REQUEST_APPROACH;
-    cmd->p_hover_W_m = (ivl_vec3_t){(float)world->kin.p_WB_m[0], (float)world->kin.p_WB_m[1], (float)world->kin.p_WB_m[2]};
+    cmd->p_hover_W_m = (ivl_vec3_t){(float)p_W_m[0], (float)p_W_m[1], (float)p_W_m[2]};
     cmd->speed_mps = (float)spec->speed_mps[0];
     cmd->angle_rad = (float)(spec->angle_deg[0] * (IVL_SIM_PI / 180.0));
 }
 
 /// @return false if the flight core refuses the policy
-static bool start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_world_t *world)
+static bool start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec)
 {
+    const ivl_sim_model_t *model = group->model;
+    ivl_sim_world_t *world = &group->world[lane];
     double sin_angle, cos_angle;
     ivl_sim_sincos(spec->angle_deg[0] * (IVL_SIM_PI / 180.0), &sin_angle, &cos_angle);
     const double plane = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m;
@@ -45,8 +46,8 @@ static bool start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_
     const double p[3] = {0.0, 0.0, plane - start_distance(model, spec, sin_angle)};
     const double v[3] = {speed * cos_angle, 0.0, speed * sin_angle};
     const ivl_sim_rng_t rng = {spec->seed[0], spec->stream[0]};
-    ivl_sim_world_init(model, &rng, p, v, world);
-    request_approach(spec, world);
+    ivl_sim_world_start(group, lane, &rng, p, v);
+    request_approach(spec, p, &world->in.cmd);
     const bool at_once = spec->start[0] == IVL_SIM_START_AT_TRIGGER;
     const ivl_policy_t policy = {.seq = 1,
                                  .rrev_c_per_s = at_once ? 0.0f : (float)spec->rrev_c_per_s[0],
@@ -112,23 +113,23 @@ static void note_end(const ivl_sim_world_t *world, ivl_sim_end_t end, ivl_sim_ou
 
 /// With the motors cut the centre of mass is a projectile: if its apex plus the reach of the vehicle stays below the
 /// ceiling, no contact can follow.  The legs' share of the centre of mass lies within `reach` of the origin.
-static bool out_of_reach(const ivl_sim_world_t *world)
+static bool out_of_reach(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
 {
-    const ivl_sim_model_t *model = world->model;
     double linear[3], angular[3];
-    ivl_sim_momentum(model, &world->kin, linear, angular);
+    ivl_sim_momentum(model, kin, linear, angular);
     const double vz = linear[2] / model->mass_total_kg;
     const double rise = (vz > 0.0) ? 0.5 * vz * vz / model->raw.world_gravity_mps2 : 0.0;
     const double leg_share = 1.0 - model->raw.body_mass_kg / model->mass_total_kg;
     const double reach = model->reach_m * (1.0 + 2.0 * leg_share);
-    return world->kin.p_WB_m[2] + rise + reach < model->raw.world_ceiling_height_m;
+    return kin->p_WB_m[2] + rise + reach < model->raw.world_ceiling_height_m;
 }
 
-static bool ended(const ivl_sim_world_t *world, const ivl_sim_outcome_t *o, ivl_sim_end_t *end)
+static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_t *o, ivl_sim_end_t *end)
 {
+    const ivl_sim_world_t *world = &group->world[lane];
     const ivl_sim_params_t *raw = &world->model->raw;
     const double slack = 1.0e-9;
-    if (!(fabs(world->kin.p_WB_m[2]) < 1.0e6 && fabs(world->kin.w_B_radps[1]) < 1.0e6))
+    if (!(fabs(group->state.p_WB_m.z[lane]) < 1.0e6 && fabs(group->state.w_B_radps.y[lane]) < 1.0e6))
     {
         *end = IVL_SIM_END_NOT_FINITE;
         return true;
@@ -149,18 +150,23 @@ static bool ended(const ivl_sim_world_t *world, const ivl_sim_outcome_t *o, ivl_
         return true;
     }
     *end = IVL_SIM_END_MISSED;
-    return ivl_motors_latched_off(&world->firmware) && out_of_reach(world);
+    if (!ivl_motors_latched_off(&world->firmware))
+    {
+        return false;
+    }
+    const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
+    return out_of_reach(world->model, &kin);
 }
 
-static void write_row(const ivl_sim_world_t *w, ivl_sim_trace_t *row)
+static void write_row(const ivl_sim_world_t *w, const ivl_sim_kin_t *kin, ivl_sim_trace_t *row)
 {
     const ivl_sim_model_t *model = w->model;
     row->t_s[0] = w->t_s;
-    memcpy(row->p_WB_m, w->kin.p_WB_m, sizeof row->p_WB_m);
-    memcpy(row->q_WB, w->kin.q_WB, sizeof row->q_WB);
-    memcpy(row->v_WB_mps, w->kin.v_WB_mps, sizeof row->v_WB_mps);
-    memcpy(row->w_B_radps, w->kin.w_B_radps, sizeof row->w_B_radps);
-    row->pitch_deg[0] = pitch_deg(&w->kin);
+    memcpy(row->p_WB_m, kin->p_WB_m, sizeof row->p_WB_m);
+    memcpy(row->q_WB, kin->q_WB, sizeof row->q_WB);
+    memcpy(row->v_WB_mps, kin->v_WB_mps, sizeof row->v_WB_mps);
+    memcpy(row->w_B_radps, kin->w_B_radps, sizeof row->w_B_radps);
+    row->pitch_deg[0] = pitch_deg(kin);
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
         const double speed = w->rotor.speed_radps[i];
@@ -171,56 +177,105 @@ static void write_row(const ivl_sim_world_t *w, ivl_sim_trace_t *row)
     {
         for (int axis = 0; axis < 3; axis++)
         {
-            row->foot_W_m[3 * leg + axis] = w->kin.p_foot_W_m[axis][leg];
+            row->foot_W_m[3 * leg + axis] = kin->p_foot_W_m[leg][axis];
         }
-        row->foot_state[leg] = (int8_t)w->contact.foot[leg];
+        row->foot_state[leg] = (int8_t)w->foot[leg];
     }
     row->phase[0] = (int32_t)w->firmware.phase;
     row->body_contact[0] = w->plate_touched[IVL_SIM_PROP_PLATE] ? 1 : 0;
-    row->d_ceil_m[0] = model->raw.world_ceiling_height_m - w->kin.p_WB_m[2];
+    row->d_ceil_m[0] = model->raw.world_ceiling_height_m - kin->p_WB_m[2];
     row->d_sensed_m[0] = (double)w->out.ceiling.d_ceil_m;
     row->rrev_per_s[0] = (double)w->out.cues.rrev_per_s;
     row->of_y_radps[0] = (double)w->out.cues.of_y_radps;
-    row->energy_J[0] = ivl_sim_energy(model, &w->kin);
+    row->energy_J[0] = ivl_sim_energy(model, kin);
 }
 
-/// A row for each period that has begun; the trace's period is a whole number of ticks at least.
-static void trace(ivl_sim_tracer_t *tracer, const ivl_sim_world_t *world)
+/// A row for each period that has begun; rows stand at ticks of the flight core.
+static void trace(ivl_sim_tracer_t *tracer, const ivl_sim_group_t *group, int lane)
 {
+    const ivl_sim_world_t *world = &group->world[lane];
     if (tracer == NULL || world->t_s < (double)tracer->n * tracer->period_s - 1.0e-9)
     {
         return;
     }
     if (tracer->n < tracer->capacity)
     {
+        const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
         memset(&tracer->rows[tracer->n], 0, sizeof tracer->rows[0]);
-        write_row(world, &tracer->rows[tracer->n]);
+        write_row(world, &kin, &tracer->rows[tracer->n]);
     }
     tracer->n++;
 }
 
-void ivl_sim_rollout(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_tracer_t *tracer,
-                     ivl_sim_outcome_t *outcome)
+static void tick(ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
 {
-    ivl_sim_world_t world;
-    ivl_sim_end_t end = IVL_SIM_END_REFUSED;
-    clear(outcome);
-    if (!start(model, spec, &world))
+    const ivl_sim_world_t *world = &group->world[lane];
+    ivl_sim_world_tick(group, lane);
+    if (world->firmware.triggered && !o->triggered[0])
     {
-        note_end(&world, end, outcome);
-        return;
+        const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
+        note_trigger(&kin, world->t_s, &world->firmware, o);
     }
-    trace(tracer, &world);
-    do
+}
+
+/// Puts the next landing of the source into a lane; the lane stays empty if there is none.
+static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
+{
+    group->active[lane] = false;
+    while (!group->active[lane] && source(context, job))
     {
-        const ivl_sim_kin_t before = world.kin;
-        const double t_s = world.t_s;
-        ivl_sim_world_tick(&world);
-        if (world.firmware.triggered && !outcome->triggered[0])
+        clear(job->outcome);
+        if (start(group, lane, job->spec))
         {
-            note_trigger(&before, t_s, &world.firmware, outcome);
+            trace(job->tracer, group, lane);
+            tick(group, lane, job->outcome);
         }
-        trace(tracer, &world);
-    } while (!ended(&world, outcome, &end));
-    note_end(&world, end, outcome);
+        else
+        {
+            note_end(&group->world[lane], IVL_SIM_END_REFUSED, job->outcome);
+            group->active[lane] = false;
+        }
+    }
+}
+
+/// What happens between two ticks.
+static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
+{
+    ivl_sim_end_t end;
+    trace(job->tracer, group, lane);
+    if (ended(group, lane, job->outcome, &end))
+    {
+        note_end(&group->world[lane], end, job->outcome);
+        refill(group, lane, source, context, job);
+    }
+    else
+    {
+        tick(group, lane, job->outcome);
+    }
+}
+
+void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
+{
+    ivl_sim_group_t group;
+    ivl_sim_job_t job[IVL_SIM_LANES];
+    bool any = false;
+    ivl_sim_group_init(model, &group);
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        refill(&group, lane, source, context, &job[lane]);
+        any = any || group.active[lane];
+    }
+    while (any)
+    {
+        ivl_sim_group_step(&group);
+        any = false;
+        for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+        {
+            if (group.active[lane] && ivl_sim_world_ready(&group, lane))
+            {
+                between_ticks(&group, lane, source, context, &job[lane]);
+            }
+            any = any || group.active[lane];
+        }
+    }
 }

@@ -105,10 +105,19 @@ typedef struct
     size_t n;        ///< rows that the landing has; those beyond the capacity are counted, not written
 } ivl_sim_tracer_t;
 
-/// Flies one landing.
-/// @param[in] tracer  NULL for none
-void ivl_sim_rollout(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_tracer_t *tracer,
-                     ivl_sim_outcome_t *outcome);
+/// One landing to fly, and where its result goes.
+typedef struct
+{
+    const ivl_sim_spec_t *spec;
+    ivl_sim_outcome_t *outcome;
+    ivl_sim_tracer_t *tracer; ///< NULL for none
+} ivl_sim_job_t;
+
+/// Gives the next landing to fly; false when there are no more.
+typedef bool (*ivl_sim_source_t)(void *context, ivl_sim_job_t *job);
+
+/// Flies all landings of a source, several at a time.  Each outcome depends on its spec alone.
+void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
 
 /// Lower-case name of an end, "?" for a number that is none.
 const char *ivl_sim_end_name(int end);

@@ -39,29 +39,33 @@ static double spin(const ivl_sim_rotor_t *rotor, double tau_up, double tau_down,
 }
 
 /// Thrust gain near the ceiling, for an upright rotor.                                           [MODEL eq. 2.5]
-static double ceiling_effect(const ivl_sim_model_t *model, const ivl_sim_kin_t *state)
+static double ceiling_effect(const ivl_sim_model_t *model, double height_m, const double q_WB[4])
 {
     const ivl_sim_params_t *raw = &model->raw;
-    const ivl_rot_t R = ivl_rot_from_quat(state->q_WB);
-    const double gap = raw->world_ceiling_height_m - state->p_WB_m[2] - R.row[2].z * raw->rotor_z_m;
+    const ivl_rot_t R = ivl_rot_from_quat(q_WB);
+    const double gap = raw->world_ceiling_height_m - height_m - R.row[2].z * raw->rotor_z_m;
     const double least = 0.5 * raw->aero_rotor_radius_m;
     const double ratio = raw->aero_rotor_radius_m / ((gap > least) ? gap : least);
     const double upright = (R.row[2].z > 0.0) ? R.row[2].z : 0.0;
     return 1.0 + raw->aero_ceiling_gain_norm * upright * ratio * ratio;
 }
 
-ivl_sim_load_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const ivl_sim_kin_t *state,
-                                  double dt_s)
+ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m,
+                                    const double q_WB[4], double dt_s)
 {
     const ivl_sim_params_t *raw = &model->raw;
+    if (!(dt_s > 0.0))
+    {
+        dt_s = 1.0e-9; // an evaluation without motion: the thrust of this instant
+    }
     if (fabs(rotor->dt_s - dt_s) > 0.0)
     {
         rotor->dt_s = dt_s;
         rotor->decay_up = ivl_sim_exp(-dt_s / raw->rotor_tau_up_s);
         rotor->decay_down = ivl_sim_exp(-dt_s / raw->rotor_tau_down_s);
     }
-    const double gain = (raw->aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, state) : 1.0;
-    ivl_sim_load_t load = {0.0, {0.0, 0.0, 0.0}};
+    const double gain = (raw->aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, height_m, q_WB) : 1.0;
+    ivl_sim_thrust_t load = {0.0, {0.0, 0.0, 0.0}};
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
         const double square = spin(rotor, raw->rotor_tau_up_s, raw->rotor_tau_down_s, &rotor->speed_radps[i],

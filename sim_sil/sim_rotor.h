@@ -3,7 +3,14 @@
 #ifndef IVL_SIM_ROTOR_H
 #define IVL_SIM_ROTOR_H
 
-#include "sim_dynamics.h"
+#include "sim_model.h"
+
+/// Force and moment on the body, mean of one step.
+typedef struct
+{
+    double thrust_N; ///< along body z
+    double torque_B_Nm[3];
+} ivl_sim_thrust_t;
 
 typedef struct
 {
@@ -20,8 +27,8 @@ void ivl_sim_rotor_init(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor);
 void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const float thrust_N[4]);
 
 /// Advances the rotors by dt and returns force and moment, each averaged over dt exactly.        [MODEL eq. 2.3, 2.4]
-/// @param[in] state  of the body at the start of the step, for the ceiling effect
-ivl_sim_load_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const ivl_sim_kin_t *state,
-                                  double dt_s);
+/// @param[in] height_m, q_WB  of the body at the start of the step, for the ceiling effect
+ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m,
+                                    const double q_WB[4], double dt_s);
 
 #endif // IVL_SIM_ROTOR_H

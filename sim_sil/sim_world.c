@@ -5,26 +5,25 @@ static const double FOOT_TOLERANCE_M = 1.0e-7;
 static const double PLATE_TOLERANCE_M = 1.0e-6;
 // A foot that came off must move this far away before it can stick again.
 static const double REARM_GAP_M = 1.0e-3;
+// A contact that is not located after so many tries is taken where it is: the try before was within a few tolerances.
 static const int LOCATE_MAX = 12;
+static const double NEAR_MARGIN_M = 0.05; // more than a vehicle moves in one step
+static const double FAR_M = 1.0;      // stands for the gap of what cannot make an event
+static const double NO_EVENT = 2.0;   // share of a step, beyond its end
+static const double TIME_SLACK_S = 1.0e-9;
 
-enum
-{
-    GAPS = IVL_SIM_LEGS + IVL_SIM_PLATES ///< feet, then plates
-};
+// ---- starting -----------------------------------------------------------------------------------------------------------
 
-static double foot_gap(const ivl_sim_model_t *model, const ivl_sim_kin_t *s, int leg)
+/// Legs at rest on a body that moves without turning.
+static void place_feet(const ivl_sim_model_t *model, ivl_sim_kin_t *kin)
 {
-    return model->raw.world_ceiling_height_m - s->p_foot_W_m[2][leg] - model->raw.leg_foot_radius_m;
-}
-
-/// Legs at rest on a level or tilted body that moves without turning.
-static void place_feet(const ivl_sim_model_t *model, ivl_sim_kin_t *s)
-{
-    const ivl_rot_t R = ivl_rot_from_quat(s->q_WB);
-    const ivl_l3_t foot_B = ivl_l3_add(model->leg.hip_B_m,
-                                       ivl_l3_scale(ivl_v4_set(model->raw.leg_length_m), model->leg.rest_B));
-    ivl_l3_store(s->p_foot_W_m, ivl_l3_add(ivl_rot_apply_l3(&R, foot_B), ivl_l3_set(ivl_d3_load(s->p_WB_m))));
-    ivl_l3_store(s->v_foot_W_mps, ivl_l3_set(ivl_d3_load(s->v_WB_mps)));
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_d3_t foot_B = ivl_d3_add(model->leg.hip_B_m[i], ivl_d3_scale(model->raw.leg_length_m, model->leg.rest_B[i]));
+        ivl_d3_store(kin->p_foot_W_m[i], ivl_d3_add(ivl_d3_load(kin->p_WB_m), ivl_rot_apply(&R, foot_B)));
+        memcpy(kin->v_foot_W_mps[i], kin->v_WB_mps, sizeof kin->v_WB_mps);
+    }
 }
 
 static void draw_scatter(ivl_sim_world_t *w)
@@ -42,58 +41,93 @@ static void draw_scatter(ivl_sim_world_t *w)
     }
 }
 
-void ivl_sim_world_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const double p_W_m[3],
-                        const double v_W_mps[3], ivl_sim_world_t *w)
+void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group)
 {
-    // field by field: the sensors' queue is large and needs no clearing
+    const ivl_sim_foot_t free_feet[IVL_SIM_LEGS] = {IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE,
+                                                    IVL_SIM_FOOT_FREE};
+    memset(group, 0, sizeof *group);
+    group->model = model;
+    ivl_sim_kin_t resting;
+    memset(&resting, 0, sizeof resting);
+    resting.q_WB[3] = 1.0;
+    place_feet(model, &resting);
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        // an empty lane is computed along with the others: it must hold numbers
+        ivl_sim_lane_set(&group->state, lane, &resting);
+        ivl_sim_contact_set(model, &group->contact, lane, free_feet);
+    }
+}
+
+void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *kin)
+{
+    ivl_sim_world_t *w = &group->world[lane];
+    ivl_sim_lane_set(&group->state, lane, kin);
+    w->restart = true;
+    w->d_min_m = w->model->raw.world_ceiling_height_m - kin->p_WB_m[2];
+}
+
+ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_kin_t kin;
+    ivl_sim_lane_get(&group->state, lane, &kin);
+    return kin;
+}
+
+void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3],
+                         const double v_W_mps[3])
+{
+    const ivl_sim_model_t *model = group->model;
+    ivl_sim_world_t *w = &group->world[lane];
+    ivl_sim_kin_t kin;
+    memset(&kin, 0, sizeof kin);
+    memcpy(kin.p_WB_m, p_W_m, sizeof kin.p_WB_m);
+    memcpy(kin.v_WB_mps, v_W_mps, sizeof kin.v_WB_mps);
+    kin.q_WB[3] = 1.0;
+    place_feet(model, &kin);
+    // all but the sensors, whose queue is large and needs no clearing
+    memset(w, 0, offsetof(ivl_sim_world_t, sensors));
+    memset(&w->firmware, 0, sizeof *w - offsetof(ivl_sim_world_t, firmware));
     w->model = model;
     w->rng = *rng;
-    w->t_s = 0.0;
-    w->n_tick = 0;
-    w->n_step = 0;
     w->step_s = model->raw.step_flight_s * model->raw.step_scale_norm;
-    memset(&w->kin, 0, sizeof w->kin);
-    memcpy(w->kin.p_WB_m, p_W_m, sizeof w->kin.p_WB_m);
-    memcpy(w->kin.v_WB_mps, v_W_mps, sizeof w->kin.v_WB_mps);
-    w->kin.q_WB[3] = 1.0;
-    place_feet(model, &w->kin);
-    ivl_sim_contact_init(model, &w->contact);
+    ivl_sim_contact_set(model, &group->contact, lane, w->foot);
     ivl_sim_rotor_init(model, &w->rotor);
     draw_scatter(w);
-    ivl_sim_sensors_init(model, rng, &w->kin, &w->sensors);
-    memset(w->a_W_mps2, 0, sizeof w->a_W_mps2);
+    ivl_sim_sensors_init(model, rng, &kin, &w->sensors);
     ivl_init(&model->firmware, &w->firmware);
-    memset(&w->in, 0, sizeof w->in);
-    memset(&w->out, 0, sizeof w->out);
-    w->impact.happened = false;
-    memset(w->t_touch_s, 0, sizeof w->t_touch_s);
-    memset(w->detached, 0, sizeof w->detached);
-    memset(w->stuck_order, 0, sizeof w->stuck_order);
-    w->n_order = 0;
-    memset(w->plate_touched, 0, sizeof w->plate_touched);
-    w->d_min_m = model->raw.world_ceiling_height_m - p_W_m[2];
+    ivl_sim_world_place(group, lane, &kin);
+    group->active[lane] = true;
+}
+
+// ---- events -------------------------------------------------------------------------------------------------------------
+
+static double plate_gap(const ivl_sim_model_t *model, const ivl_sim_state_t *s, int lane, int plate)
+{
+    ivl_sim_kin_t pose; // what the overlap needs of it
+    pose.p_WB_m[2] = s->p_WB_m.z[lane];
+    for (int i = 0; i < 4; i++)
+    {
+        pose.q_WB[i] = s->q_WB[i][lane];
+    }
+    return -ivl_sim_plate_overlap(model, &pose, plate);
 }
 
 /// Distances that make an event when they pass zero: of feet that may stick, and of plates that have not touched yet.
-/// Others are reported as far away.
-static void gaps(const ivl_sim_world_t *w, const ivl_sim_kin_t *s, double gap[GAPS])
+static void gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double gap[IVL_SIM_GAPS])
 {
+    const ivl_sim_params_t *raw = &w->model->raw;
+    const double height = raw->world_ceiling_height_m;
+    const bool near = s->p_WB_m.z[lane] + w->model->reach_m + NEAR_MARGIN_M > height;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        const bool may_touch = (w->contact.foot[i] == IVL_SIM_FOOT_FREE) && !w->detached[i];
-        gap[i] = may_touch ? foot_gap(w->model, s, i) : 1.0;
+        const bool may_touch = near && (w->foot[i] == IVL_SIM_FOOT_FREE) && !w->detached[i];
+        gap[i] = may_touch ? height - s->p_foot_W_m[i].z[lane] - raw->leg_foot_radius_m : FAR_M;
     }
-    const double highest = s->p_WB_m[2] + w->model->reach_m;
-    const bool near = highest > w->model->raw.world_ceiling_height_m;
     for (int i = 0; i < IVL_SIM_PLATES; i++)
     {
-        gap[IVL_SIM_LEGS + i] = (near && !w->plate_touched[i]) ? -ivl_sim_plate_overlap(w->model, s, i) : 1.0;
+        gap[IVL_SIM_LEGS + i] = (near && !w->plate_touched[i]) ? plate_gap(w->model, s, lane, i) : FAR_M;
     }
-}
-
-static double tolerance(int index)
-{
-    return (index < IVL_SIM_LEGS) ? FOOT_TOLERANCE_M : PLATE_TOLERANCE_M;
 }
 
 static double hermite(double g0, double d0, double g1, double d1, double x)
@@ -102,77 +136,67 @@ static double hermite(double g0, double d0, double g1, double d1, double x)
     return ((a * x + b) * x + d0) * x + g0;
 }
 
-/// Share of the step after which a foot first reaches the ceiling, 2 if it does not: from the cubic through height and
-/// speed at both ends, so that a foot which rings into the ceiling and back within one step is not missed.
-static double foot_share(const ivl_sim_world_t *w, const ivl_sim_kin_t *next, double dt, double g0, double g1, int leg)
+/// Share of a step at which a cubic, given by values and slopes at both ends, first falls to zero; NO_EVENT if it does not.
+static double first_zero(double g0, double d0, double g1, double d1, double tolerance)
 {
-    const double d0 = -w->kin.v_foot_W_mps[2][leg] * dt, d1 = -next->v_foot_W_mps[2][leg] * dt;
     double lo = 0.0, hi = 1.0;
-    if (g1 >= -FOOT_TOLERANCE_M)
+    if (g1 >= -tolerance)
     {
         // the only way in and out again is a minimum in between
         if (!(d0 < 0.0 && d1 > 0.0))
         {
-            return 2.0;
+            return NO_EVENT;
         }
         const double a = 3.0 * (2.0 * (g0 - g1) + d0 + d1), b = 2.0 * (3.0 * (g1 - g0) - 2.0 * d0 - d1);
         const double root = b * b - 4.0 * a * d0;
         hi = (root > 0.0) ? 2.0 * d0 / (-b - sqrt(root)) : 1.0;
-        if (!(hi > 0.0 && hi < 1.0) || hermite(g0, d0, g1, d1, hi) >= -FOOT_TOLERANCE_M)
+        if (!(hi > 0.0 && hi < 1.0) || hermite(g0, d0, g1, d1, hi) >= -tolerance)
         {
-            return 2.0;
+            return NO_EVENT;
         }
     }
-    for (int i = 0; i < 50; i++)
+    for (int i = 0; i < 40; i++)
     {
         const double mid = 0.5 * (lo + hi);
-        if (hermite(g0, d0, g1, d1, mid) > 0.0)
-        {
-            lo = mid;
-        }
-        else
-        {
-            hi = mid;
-        }
+        const bool outside = hermite(g0, d0, g1, d1, mid) > 0.0;
+        lo = outside ? mid : lo;
+        hi = outside ? hi : mid;
     }
     return hi;
 }
 
-/// Share of the step after which the earliest event happens, 2 if there is none.
-static double event_share(const ivl_sim_world_t *w, const ivl_sim_kin_t *next, double dt, const double g0[GAPS])
+/// Share of the tried step after which the earliest event happens.
+static double event_share(const ivl_sim_group_t *group, int lane)
 {
-    double g1[GAPS], share = 2.0;
-    gaps(w, next, g1);
-    for (int i = 0; i < GAPS; i++)
+    const ivl_sim_world_t *w = &group->world[lane];
+    const double *g0 = w->trial.gap_m, dt = w->trial.dt_s;
+    double g1[IVL_SIM_GAPS], share = NO_EVENT;
+    gaps(w, &group->next, lane, g1);
+    for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
-        double s = 2.0;
-        if (i < IVL_SIM_LEGS)
+        double s = NO_EVENT;
+        if (i >= IVL_SIM_LEGS)
         {
-            s = (g0[i] < 1.0) ? foot_share(w, next, dt, g0[i], g1[i], i) : 2.0;
+            s = (g1[i] < -PLATE_TOLERANCE_M) ? g0[i] / (g0[i] - g1[i]) : NO_EVENT;
         }
-        else if (g1[i] < -PLATE_TOLERANCE_M)
+        else if (g1[i] < FAR_M)
         {
-            s = (g0[i] > 0.0) ? g0[i] / (g0[i] - g1[i]) : 0.0;
+            // a foot rings: cubic through height and speed, so that a touch within the step is not missed
+            const double d0 = -dt * group->state.v_foot_W_mps[i].z[lane], d1 = -dt * group->next.v_foot_W_mps[i].z[lane];
+            s = first_zero(g0[i], d0, g1[i], d1, FOOT_TOLERANCE_M);
         }
         share = (s < share) ? s : share;
     }
     return share;
 }
 
-static void remember_impact(ivl_sim_world_t *w)
+static void hold(ivl_sim_group_t *group, int lane, int leg, ivl_sim_foot_t foot)
 {
-    if (!w->impact.happened)
-    {
-        w->impact.happened = true;
-        w->impact.t_s = w->t_s;
-        w->impact.kin = w->kin;
-    }
-}
-
-static void stick(ivl_sim_world_t *w, int leg)
-{
-    ivl_sim_contact_set(w->model, &w->contact, leg, IVL_SIM_FOOT_STUCK);
-    bool listed = false;
+    ivl_sim_world_t *w = &group->world[lane];
+    w->foot[leg] = foot;
+    w->restart = true;
+    ivl_sim_contact_set(w->model, &group->contact, lane, w->foot);
+    bool listed = foot != IVL_SIM_FOOT_STUCK;
     for (int i = 0; i < w->n_order; i++)
     {
         listed = listed || (w->stuck_order[i] == leg + 1);
@@ -183,99 +207,11 @@ static void stick(ivl_sim_world_t *w, int leg)
     }
 }
 
-/// Feet and plates that have arrived at the ceiling.  Feet that arrive together are stopped together.
-static bool handle_touches(ivl_sim_world_t *w)
+static void stop_held_feet(ivl_sim_group_t *group, int lane)
 {
-    double gap[GAPS];
-    bool event = false, foot_event = false;
-    gaps(w, &w->kin, gap);
-    for (int i = 0; i < GAPS; i++)
-    {
-        const bool closing = (i >= IVL_SIM_LEGS) || (w->kin.v_foot_W_mps[2][i] > 0.0);
-        if (gap[i] > tolerance(i) || !closing)
-        {
-            continue;
-        }
-        event = true;
-        remember_impact(w);
-        if (i >= IVL_SIM_LEGS)
-        {
-            w->plate_touched[i - IVL_SIM_LEGS] = true;
-        }
-        else
-        {
-            foot_event = true;
-            w->t_touch_s[i] = w->t_s;
-            if (w->model->raw.leg_stick_delay_s > 0.0)
-            {
-                ivl_sim_contact_set(w->model, &w->contact, i, IVL_SIM_FOOT_SLIDING);
-            }
-            else
-            {
-                stick(w, i);
-            }
-        }
-    }
-    if (foot_event)
-    {
-        ivl_sim_impulse(w->model, &w->contact, &w->kin);
-    }
-    return event;
-}
-
-/// Held feet: a sliding one sticks after the delay or lifts off, a stuck one comes off beyond the adhesion.
-static bool handle_held(ivl_sim_world_t *w, const ivl_sim_forces_t *forces)
-{
-    bool event = false;
-    for (int i = 0; i < IVL_SIM_LEGS; i++)
-    {
-        if (w->contact.foot[i] == IVL_SIM_FOOT_SLIDING && forces->pull_N[i] > 0.0)
-        {
-            ivl_sim_contact_set(w->model, &w->contact, i, IVL_SIM_FOOT_FREE);
-            w->detached[i] = true;
-            event = true;
-        }
-        else if (w->contact.foot[i] == IVL_SIM_FOOT_SLIDING &&
-                 w->t_s >= w->t_touch_s[i] + w->model->raw.leg_stick_delay_s)
-        {
-            stick(w, i);
-            ivl_sim_impulse(w->model, &w->contact, &w->kin);
-            event = true;
-        }
-        else if (w->contact.foot[i] == IVL_SIM_FOOT_STUCK && forces->pull_N[i] > w->model->raw.leg_adhesion_N)
-        {
-            ivl_sim_contact_set(w->model, &w->contact, i, IVL_SIM_FOOT_FREE);
-            w->detached[i] = true;
-            event = true;
-        }
-        else if (w->detached[i] && foot_gap(w->model, &w->kin, i) > REARM_GAP_M)
-        {
-            w->detached[i] = false;
-        }
-    }
-    return event;
-}
-
-/// The step to try: graded after events, short while a plate presses, a whole share of what is left, and not beyond the
-/// instant at which a sliding foot may stick.
-static double choose_step(const ivl_sim_world_t *w, const ivl_sim_forces_t *forces, double left_s)
-{
-    const ivl_sim_params_t *raw = &w->model->raw;
-    double step = w->step_s;
-    const double plate = raw->step_plate_s * raw->step_scale_norm;
-    if ((forces->plate_touches[0] || forces->plate_touches[1]) && step > plate)
-    {
-        step = plate;
-    }
-    for (int i = 0; i < IVL_SIM_LEGS && w->contact.any_sliding; i++)
-    {
-        const double wait = w->t_touch_s[i] + raw->leg_stick_delay_s - w->t_s;
-        if (w->contact.foot[i] == IVL_SIM_FOOT_SLIDING && wait > 1.0e-9 && wait < step)
-        {
-            step = wait;
-        }
-    }
-    return (step < left_s) ? left_s / ceil(left_s / step - 1.0e-6) : left_s;
+    ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
+    ivl_sim_impulse(group->model, group->world[lane].foot, &kin);
+    ivl_sim_lane_set(&group->state, lane, &kin);
 }
 
 static void grade_step(ivl_sim_world_t *w, bool event)
@@ -286,87 +222,268 @@ static void grade_step(ivl_sim_world_t *w, bool event)
     w->step_s = (next < most) ? next : most;
 }
 
-static void watch(ivl_sim_world_t *w)
+/// Feet and plates that have arrived at the ceiling.  Feet that arrive together are stopped together.
+static void handle_touches(ivl_sim_group_t *group, int lane, const double gap[IVL_SIM_GAPS])
 {
-    const double d = w->model->raw.world_ceiling_height_m - w->kin.p_WB_m[2];
-    w->d_min_m = (d < w->d_min_m) ? d : w->d_min_m;
-    w->n_step++;
-}
-
-/// One integration step, cut at the first contact event; returns its length.
-static double step(ivl_sim_world_t *w, double left_s)
-{
-    const ivl_sim_model_t *model = w->model;
-    ivl_sim_kin_t rate, next;
-    ivl_sim_forces_t forces = {{0.0}, {0.0}, {false, false}};
-    double g0[GAPS];
-    if (handle_touches(w))
+    ivl_sim_world_t *w = &group->world[lane];
+    bool event = false, foot_event = false;
+    for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
-        grade_step(w, true);
-    }
-    gaps(w, &w->kin, g0);
-    ivl_sim_rotor_t rotor = w->rotor;
-    double dt = (w->step_s < left_s) ? left_s / ceil(left_s / w->step_s - 1.0e-6) : left_s;
-    ivl_sim_load_t load = ivl_sim_rotor_step(model, &rotor, &w->kin, dt);
-    ivl_sim_rate(model, &w->contact, &load, &w->kin, &rate, &forces);
-    if (handle_held(w, &forces))
-    {
-        grade_step(w, true);
-        gaps(w, &w->kin, g0);
-        ivl_sim_rate(model, &w->contact, &load, &w->kin, &rate, &forces);
-    }
-    double chosen = choose_step(w, &forces, left_s);
-    double share = 1.0;
-    for (int i = 0; i < LOCATE_MAX && share < 2.0; i++)
-    {
-        if (chosen < dt)
+        const bool is_foot = i < IVL_SIM_LEGS;
+        if (gap[i] > (is_foot ? FOOT_TOLERANCE_M : PLATE_TOLERANCE_M) ||
+            (is_foot && !(group->state.v_foot_W_mps[i].z[lane] > 0.0)))
         {
-            // a shorter step has other mean rotor forces
-            dt = chosen;
-            rotor = w->rotor;
-            load = ivl_sim_rotor_step(model, &rotor, &w->kin, dt);
-            ivl_sim_rate(model, &w->contact, &load, &w->kin, &rate, &forces);
+            continue;
         }
-        ivl_sim_rk4(model, &w->contact, &load, &rate, dt, &w->kin, &next);
-        share = event_share(w, &next, dt, g0);
-        chosen = dt * share;
+        if (!w->impact.happened)
+        {
+            w->impact = (ivl_sim_impact_t){true, w->t_s, ivl_sim_world_kin(group, lane)};
+        }
+        event = true;
+        if (is_foot)
+        {
+            foot_event = true;
+            w->t_touch_s[i] = w->t_s;
+            hold(group, lane, i, (w->model->raw.leg_stick_delay_s > 0.0) ? IVL_SIM_FOOT_SLIDING : IVL_SIM_FOOT_STUCK);
+        }
+        else
+        {
+            w->plate_touched[i - IVL_SIM_LEGS] = true;
+        }
     }
-    memcpy(w->a_W_mps2, forces.a_WB_mps2, sizeof w->a_W_mps2);
-    w->rotor = rotor;
-    w->kin = next;
-    w->t_s += dt;
-    watch(w);
-    grade_step(w, false);
-    return dt;
-}
-
-void ivl_sim_world_advance(ivl_sim_world_t *w, double dt_s)
-{
-    double left = dt_s;
-    while (left > 1.0e-9)
+    if (foot_event)
     {
-        left -= step(w, left);
+        stop_held_feet(group, lane);
     }
-    if (handle_touches(w))
+    if (event)
     {
         grade_step(w, true);
     }
 }
 
-void ivl_sim_world_tick(ivl_sim_world_t *w)
+/// Held feet: a sliding one sticks after the delay or lifts off, a stuck one comes off beyond the adhesion.
+/// @return true if any did: the forces have jumped
+static bool handle_held(ivl_sim_group_t *group, int lane)
 {
+    ivl_sim_world_t *w = &group->world[lane];
+    const ivl_sim_params_t *raw = &w->model->raw;
+    bool event = false;
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const double pull = group->rate.pull_N[i][lane];
+        if ((w->foot[i] == IVL_SIM_FOOT_SLIDING && pull > 0.0) || (w->foot[i] == IVL_SIM_FOOT_STUCK && pull > raw->leg_adhesion_N))
+        {
+            hold(group, lane, i, IVL_SIM_FOOT_FREE);
+            w->detached[i] = true;
+            event = true;
+        }
+        else if (w->foot[i] == IVL_SIM_FOOT_SLIDING && w->t_s >= w->t_touch_s[i] + raw->leg_stick_delay_s - TIME_SLACK_S)
+        {
+            hold(group, lane, i, IVL_SIM_FOOT_STUCK);
+            stop_held_feet(group, lane);
+            event = true;
+        }
+        else if (w->detached[i])
+        {
+            const double gap = raw->world_ceiling_height_m - group->state.p_foot_W_m[i].z[lane] - raw->leg_foot_radius_m;
+            w->detached[i] = !(gap > REARM_GAP_M);
+        }
+    }
+    if (event)
+    {
+        grade_step(w, true);
+    }
+    return event;
+}
+
+// ---- one step -----------------------------------------------------------------------------------------------------------
+
+static bool plates_press(const ivl_sim_rate_t *rate, int lane)
+{
+    return rate->overlap_m[IVL_SIM_PROP_PLATE][lane] > 0.0 || rate->overlap_m[IVL_SIM_BASE_PLATE][lane] > 0.0;
+}
+
+/// Graded after events, short while a plate presses, a whole share of what is left, and not beyond the instant at which a
+/// sliding foot may stick.
+static double choose_step(const ivl_sim_world_t *w, bool plates)
+{
+    const ivl_sim_params_t *raw = &w->model->raw;
+    const double plate = raw->step_plate_s * raw->step_scale_norm;
+    double step = (plates && w->step_s > plate) ? plate : w->step_s;
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const double wait = w->t_touch_s[i] + raw->leg_stick_delay_s - w->t_s;
+        if (w->foot[i] == IVL_SIM_FOOT_SLIDING && wait > TIME_SLACK_S && wait < step)
+        {
+            step = wait;
+        }
+    }
+    return (step < w->left_s) ? w->left_s / ceil(w->left_s / step - 1.0e-6) : w->left_s;
+}
+
+/// Sets up lane `lane` for a step of length dt.
+static void propose(ivl_sim_group_t *group, int lane, double dt)
+{
+    ivl_sim_world_t *w = &group->world[lane];
+    double q[4];
+    for (int i = 0; i < 4; i++)
+    {
+        q[i] = group->state.q_WB[i][lane];
+    }
+    w->trial.dt_s = dt;
+    w->trial.rotor = w->rotor;
+    const ivl_sim_thrust_t thrust = ivl_sim_rotor_step(w->model, &w->trial.rotor, group->state.p_WB_m.z[lane], q, dt);
+    group->dt_s[lane] = dt;
+    group->load.thrust_N[lane] = thrust.thrust_N;
+    group->load.torque_B_Nm.x[lane] = thrust.torque_B_Nm[0];
+    group->load.torque_B_Nm.y[lane] = thrust.torque_B_Nm[1];
+    group->load.torque_B_Nm.z[lane] = thrust.torque_B_Nm[2];
+}
+
+static void begin_step(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t *w = &group->world[lane];
+    gaps(w, &group->state, lane, w->trial.gap_m);
+    handle_touches(group, lane, w->trial.gap_m);
+    w->trial.starting = w->restart;
+    w->restart = false;
+    w->trial.n_try = 0;
+    propose(group, lane, w->trial.starting ? 0.0 : choose_step(w, plates_press(&group->last, lane)));
+}
+
+/// Looks at the step that was tried.
+/// @return true if it stands; if not, another has been proposed
+static bool judge(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t *w = &group->world[lane];
+    if (handle_held(group, lane))
+    {
+        w->trial.n_try = 0; // the forces have jumped: begin again from here
+        return false;
+    }
+    if (w->trial.starting)
+    {
+        return true;
+    }
+    const double most = choose_step(w, plates_press(&group->rate, lane));
+    const double share = (w->trial.n_try < LOCATE_MAX) ? event_share(group, lane) : NO_EVENT;
+    const double dt = (share < 1.0) ? share * w->trial.dt_s : w->trial.dt_s;
+    if (dt < w->trial.dt_s || most < w->trial.dt_s - TIME_SLACK_S)
+    {
+        w->trial.n_try++;
+        propose(group, lane, (dt < most) ? dt : most);
+        return false;
+    }
+    return true;
+}
+
+static void accept(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t *w = &group->world[lane];
+    if (w->trial.starting)
+    {
+        return;
+    }
+    w->rotor = w->trial.rotor;
+    w->t_s += w->trial.dt_s;
+    w->left_s -= w->trial.dt_s;
+    w->n_step++;
+    const double d = w->model->raw.world_ceiling_height_m - group->next.p_WB_m.z[lane];
+    w->d_min_m = (d < w->d_min_m) ? d : w->d_min_m;
+    grade_step(w, false);
+}
+
+/// state = next and last = rate, in the lanes where the step stands.
+static void commit(ivl_sim_group_t *group, ivl_mask_t stands)
+{
+    ivl_wide_t *state = (ivl_wide_t *)&group->state, *last = (ivl_wide_t *)&group->last;
+    const ivl_wide_t *next = (const ivl_wide_t *)&group->next, *rate = (const ivl_wide_t *)&group->rate;
+    for (size_t i = 0; i < sizeof group->state / sizeof *state; i++)
+    {
+        state[i] = ivl_wide_select(stands, next[i], state[i]);
+    }
+    for (size_t i = 0; i < sizeof group->last / sizeof *last; i++)
+    {
+        last[i] = ivl_wide_select(stands, rate[i], last[i]);
+    }
+}
+
+bool ivl_sim_world_ready(const ivl_sim_group_t *group, int lane)
+{
+    return !(group->world[lane].left_s > TIME_SLACK_S);
+}
+
+void ivl_sim_group_step(ivl_sim_group_t *group)
+{
+    ivl_mask_t stands;
+    bool moving[IVL_SIM_LANES];
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        moving[lane] = group->active[lane] && !ivl_sim_world_ready(group, lane);
+        if (!moving[lane])
+        {
+            group->dt_s[lane] = 0.0;
+        }
+        else if (group->world[lane].trial.n_try == 0)
+        {
+            begin_step(group, lane);
+        }
+    }
+    ivl_sim_leapfrog(group->model, &group->contact, &group->load, &group->dt_s, &group->state, &group->last, &group->next,
+                     &group->rate);
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        stands[lane] = 0;
+        if (moving[lane] && judge(group, lane))
+        {
+            accept(group, lane);
+            group->world[lane].trial.n_try = 0;
+            stands[lane] = -1;
+        }
+    }
+    commit(group, stands);
+}
+
+static bool all_ready(const ivl_sim_group_t *group)
+{
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        if (group->active[lane] && !ivl_sim_world_ready(group, lane))
+        {
+            return false;
+        }
+    }
+    return true;
+}
+
+void ivl_sim_group_advance(ivl_sim_group_t *group, double dt_s)
+{
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        group->world[lane].left_s = dt_s;
+    }
+    while (!all_ready(group))
+    {
+        ivl_sim_group_step(group);
+    }
+}
+
+void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t *w = &group->world[lane];
     const ivl_sim_model_t *model = w->model;
     // time is a count of ticks, so that it does not drift
-    const double start = w->t_s, end = (double)(w->n_tick + 1) * model->tick_s;
+    w->t_s = (double)w->n_tick * model->tick_s;
+    w->n_tick++;
+    w->left_s = (double)w->n_tick * model->tick_s - w->t_s;
     if (!ivl_motors_latched_off(&w->firmware))
     {
-        ivl_sim_sensors_read(model, &w->rng, &w->kin, w->a_W_mps2, w->t_s, &w->sensors, &w->in);
+        const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
+        const double a[3] = {group->last.a_WB_mps2.x[lane], group->last.a_WB_mps2.y[lane], group->last.a_WB_mps2.z[lane]};
+        ivl_sim_sensors_read(model, &w->rng, &kin, a, w->t_s, &w->sensors, &w->in);
         ivl_step(&model->firmware, &w->firmware, &w->in, &w->out);
         ivl_sim_rotor_command(model, &w->rotor, w->out.thrust_N);
     }
-    ivl_sim_world_advance(w, end - start);
-    w->t_s = end;
-    w->n_tick++;
 }
 
 int ivl_sim_world_count_stuck(const ivl_sim_world_t *w)
@@ -374,7 +491,7 @@ int ivl_sim_world_count_stuck(const ivl_sim_world_t *w)
     int n = 0;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        n += (w->contact.foot[i] == IVL_SIM_FOOT_STUCK) ? 1 : 0;
+        n += (w->foot[i] == IVL_SIM_FOOT_STUCK) ? 1 : 0;
     }
     return n;
 }

@@ -1,10 +1,18 @@
 /// @file sim_world.h
-/// One vehicle under one ceiling: sensors, flight core, rotors, body and legs, contact events, advanced tick by tick.
+/// Vehicles under a ceiling: sensors, flight core, rotors, body and legs, contact events.
+///
+/// Eight worlds form a group and share each integration step; each has its own clock, step length and events, and no
+/// world's bits depend on the others'.  One world alone is a group with seven empty lanes.
 #ifndef IVL_SIM_WORLD_H
 #define IVL_SIM_WORLD_H
 
 #include "sim_rotor.h"
 #include "sim_sensors.h"
+
+enum
+{
+    IVL_SIM_GAPS = IVL_SIM_LEGS + IVL_SIM_PLATES ///< distances that make an event: feet, then plates
+};
 
 /// The first contact of any foot or plate with the ceiling, just before it acts.
 typedef struct
@@ -14,40 +22,78 @@ typedef struct
     ivl_sim_kin_t kin;
 } ivl_sim_impact_t;
 
+/// The step that is being tried.
+typedef struct
+{
+    double dt_s;
+    ivl_sim_rotor_t rotor; ///< after the step
+    double gap_m[IVL_SIM_GAPS]; ///< before the step
+    int n_try;             ///< 0 at first; more while a contact is being located
+    bool starting;         ///< evaluates only: the forces have jumped
+} ivl_sim_trial_t;
+
 typedef struct
 {
     const ivl_sim_model_t *model;
     ivl_sim_rng_t rng;
     double t_s;
+    double left_s;   ///< of the present tick
     uint32_t n_tick; ///< ticks of the flight core since the start
     uint32_t n_step; ///< integration steps since the start
     double step_s;   ///< next integration step, graded after events
-    ivl_sim_kin_t kin;
-    ivl_sim_contact_t contact;
+    bool restart;    ///< the forces have jumped since the last evaluation
+    ivl_sim_foot_t foot[IVL_SIM_LEGS];
+    ivl_sim_trial_t trial;
     ivl_sim_rotor_t rotor;
     ivl_sim_sensors_t sensors;
-    double a_W_mps2[3]; ///< acceleration at the start of the last step
     ivl_state_t firmware;
     ivl_in_t in;
     ivl_out_t out;
     ivl_sim_impact_t impact;
-    double t_touch_s[IVL_SIM_LEGS];       ///< since when a sliding foot presses
-    bool detached[IVL_SIM_LEGS];          ///< came off; cannot stick again before it has moved away
-    int8_t stuck_order[IVL_SIM_LEGS];     ///< leg numbers 1..4 in the order of first sticking, 0 none
+    double t_touch_s[IVL_SIM_LEGS];   ///< since when a sliding foot presses
+    bool detached[IVL_SIM_LEGS];      ///< came off; cannot stick again before it has moved away
+    int8_t stuck_order[IVL_SIM_LEGS]; ///< leg numbers 1..4 in the order of first sticking, 0 none
     int n_order;
     bool plate_touched[IVL_SIM_PLATES];
-    double d_min_m;       ///< smallest distance of the body origin from the ceiling's surface
+    double d_min_m; ///< smallest distance of the body origin from the ceiling's surface
 } ivl_sim_world_t;
 
-/// A vehicle in free flight at (p, v), level, rotors at hover, legs at rest; the core in IDLE.
-void ivl_sim_world_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const double p_W_m[3],
-                        const double v_W_mps[3], ivl_sim_world_t *world);
+typedef struct
+{
+    const ivl_sim_model_t *model;
+    ivl_sim_state_t state, next;
+    ivl_sim_rate_t last, rate;
+    ivl_sim_contact_t contact;
+    ivl_sim_load_t load;
+    ivl_wide_t dt_s;
+    bool active[IVL_SIM_LANES];
+    ivl_sim_world_t world[IVL_SIM_LANES];
+} ivl_sim_group_t;
 
-/// One tick of the flight core (skipped while its motors are latched off) and the motion until the next.
-void ivl_sim_world_tick(ivl_sim_world_t *world);
+/// All lanes empty.
+void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group);
 
-/// Motion alone, for dt, with the rotor commands as they are.
-void ivl_sim_world_advance(ivl_sim_world_t *world, double dt_s);
+/// Puts a vehicle into a lane: in free flight, level, rotors at hover, legs at rest; the core in IDLE.
+void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3],
+                         const double v_W_mps[3]);
+
+/// Replaces the state of motion, for tests; the feet hold on as before.
+void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *kin);
+
+/// State of motion of one vehicle.
+ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane);
+
+/// A tick of the flight core (skipped while its motors are latched off); the motion until the next one is then due.
+void ivl_sim_world_tick(ivl_sim_group_t *group, int lane);
+
+/// True when the motion that was due is done: the next tick can begin.
+bool ivl_sim_world_ready(const ivl_sim_group_t *group, int lane);
+
+/// One integration step of every active world that is not ready.
+void ivl_sim_group_step(ivl_sim_group_t *group);
+
+/// Motion alone, for dt, with the rotor commands as they are; of all active worlds.
+void ivl_sim_group_advance(ivl_sim_group_t *group, double dt_s);
 
 int ivl_sim_world_count_stuck(const ivl_sim_world_t *world);
 
