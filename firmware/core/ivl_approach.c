@@ -26,7 +26,7 @@ ivl_reference_t ivl_approach_next(const ivl_cfg_t *cfg, ivl_approach_t *approach
     const ivl_reference_t ref = {
         .p_W_m = approach->p_W_m,
         .v_W_mps = ivl_scale(dir, approach->speed_mps),
-        .a_W_mps2 = ivl_scale(dir, dv_mps / dt_s),
+        .a_W_mps2 = ivl_scale(dir, dv_mps * cfg->tick_hz),
     };
 
     // constant acceleration over the tick

@@ -11,19 +11,6 @@ static const float QUARTER_PI = 0.785398163f;
 static const float SINCOS_RAD_MAX = 100.0f;
 static const float TAN_RAD_MAX = 1.5f;
 
-ivl_axes_t ivl_axes_of(ivl_quat_t q_WB)
-{
-    // doubled products: each appears in several elements
-    const float xx = 2.0f * q_WB.x * q_WB.x, yy = 2.0f * q_WB.y * q_WB.y, zz = 2.0f * q_WB.z * q_WB.z;
-    const float xy = 2.0f * q_WB.x * q_WB.y, xz = 2.0f * q_WB.x * q_WB.z, yz = 2.0f * q_WB.y * q_WB.z;
-    const float wx = 2.0f * q_WB.w * q_WB.x, wy = 2.0f * q_WB.w * q_WB.y, wz = 2.0f * q_WB.w * q_WB.z;
-    return (ivl_axes_t){
-        .x = {1.0f - (yy + zz), xy + wz, xz - wy},
-        .y = {xy - wz, 1.0f - (xx + zz), yz + wx},
-        .z = {xz + wy, yz - wx, 1.0f - (xx + yy)},
-    };
-}
-
 // sin x on [-pi/4, pi/4]
 static float sin_poly(float x, float z)
 {

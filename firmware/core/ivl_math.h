@@ -70,7 +70,18 @@ static inline bool ivl_vec3_within(ivl_vec3_t a, float limit)
 }
 
 /// Body axes in W of a unit quaternion q_WB.
-ivl_axes_t ivl_axes_of(ivl_quat_t q_WB);
+static inline ivl_axes_t ivl_axes_of(ivl_quat_t q_WB)
+{
+    // doubled products: each appears in several elements
+    const float xx = 2.0f * q_WB.x * q_WB.x, yy = 2.0f * q_WB.y * q_WB.y, zz = 2.0f * q_WB.z * q_WB.z;
+    const float xy = 2.0f * q_WB.x * q_WB.y, xz = 2.0f * q_WB.x * q_WB.z, yz = 2.0f * q_WB.y * q_WB.z;
+    const float wx = 2.0f * q_WB.w * q_WB.x, wy = 2.0f * q_WB.w * q_WB.y, wz = 2.0f * q_WB.w * q_WB.z;
+    return (ivl_axes_t){
+        .x = {1.0f - (yy + zz), xy + wz, xz - wy},
+        .y = {xy - wz, 1.0f - (xx + zz), yz + wx},
+        .z = {xz + wy, yz - wx, 1.0f - (xx + yy)},
+    };
+}
 
 /// Sine and cosine, absolute error below 1.5e-7 for |x| <= 100 rad; {0, 1} for anything else, NaN included.
 ivl_sincos_t ivl_sincos(float x_rad);
