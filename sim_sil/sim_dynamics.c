@@ -687,11 +687,8 @@ void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, do
     ivl_d3_store(angular, a);
 }
 
-double ivl_sim_plate_overlap(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, int plate)
+double ivl_sim_plate_top(const ivl_sim_plate_t *plate, ivl_d3_t up)
 {
-    const ivl_sim_plate_t *p = &model->plate[plate];
-    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
-    const ivl_d3_t up = R.row[2];
-    return kin->p_WB_m[2] + fabs(up.x) * p->half_m[0] + fabs(up.y) * p->half_m[1] + fabs(up.z) * p->half_m[2] +
-           up.z * p->center_z_m - model->raw.world_ceiling_height_m;
+    return fabs(up.x) * plate->half_m[0] + fabs(up.y) * plate->half_m[1] + fabs(up.z) * plate->half_m[2] +
+           up.z * plate->center_z_m;
 }

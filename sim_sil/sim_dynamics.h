@@ -94,7 +94,8 @@ double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin);
 /// Linear momentum, and angular momentum about the world's origin, SI.
 void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, double linear[3], double angular[3]);
 
-/// Height of the highest point of a plate above the ceiling's surface: > 0 while it presses.
-double ivl_sim_plate_overlap(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, int plate);
+/// Height of the highest point of a plate above the body origin.
+/// @param[in] up  the world's z axis in body axes
+double ivl_sim_plate_top(const ivl_sim_plate_t *plate, ivl_d3_t up);
 
 #endif // IVL_SIM_DYNAMICS_H

@@ -50,10 +50,26 @@ static double ceiling_effect(const ivl_sim_model_t *model, double height_m, cons
     return 1.0 + raw->aero_ceiling_gain_norm * upright * ratio * ratio;
 }
 
+/// No rotor turns or is told to.
+static bool still(const ivl_sim_rotor_t *rotor)
+{
+    double most = 0.0;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        most += rotor->speed_radps[i] + rotor->command_radps[i];
+    }
+    return !(most > 0.0);
+}
+
 ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m,
                                     const double q_WB[4], double dt_s)
 {
     const ivl_sim_params_t *raw = &model->raw;
+    ivl_sim_thrust_t load = {0.0, {0.0, 0.0, 0.0}};
+    if (still(rotor))
+    {
+        return load;
+    }
     if (!(dt_s > 0.0))
     {
         dt_s = 1.0e-9; // an evaluation without motion: the thrust of this instant
@@ -65,7 +81,6 @@ ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_
         rotor->decay_down = ivl_sim_exp(-dt_s / raw->rotor_tau_down_s);
     }
     const double gain = (raw->aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, height_m, q_WB) : 1.0;
-    ivl_sim_thrust_t load = {0.0, {0.0, 0.0, 0.0}};
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
         const double square = spin(rotor, raw->rotor_tau_up_s, raw->rotor_tau_down_s, &rotor->speed_radps[i],

@@ -102,31 +102,29 @@ void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *
 
 // ---- events -------------------------------------------------------------------------------------------------------------
 
-static double plate_gap(const ivl_sim_model_t *model, const ivl_sim_state_t *s, int lane, int plate)
+/// Height of a plate's highest point above the body origin depends on the world's z axis in body axes alone.
+static ivl_d3_t up_of(const ivl_sim_state_t *s, int lane)
 {
-    ivl_sim_kin_t pose; // what the overlap needs of it
-    pose.p_WB_m[2] = s->p_WB_m.z[lane];
-    for (int i = 0; i < 4; i++)
-    {
-        pose.q_WB[i] = s->q_WB[i][lane];
-    }
-    return -ivl_sim_plate_overlap(model, &pose, plate);
+    const double x = s->q_WB[0][lane], y = s->q_WB[1][lane], z = s->q_WB[2][lane], w = s->q_WB[3][lane];
+    return ivl_d3(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y));
 }
 
 /// Distances that make an event when they pass zero: of feet that may stick, and of plates that have not touched yet.
 static void gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double gap[IVL_SIM_GAPS])
 {
     const ivl_sim_params_t *raw = &w->model->raw;
-    const double height = raw->world_ceiling_height_m;
-    const bool near = s->p_WB_m.z[lane] + w->model->reach_m + NEAR_MARGIN_M > height;
+    const double room = raw->world_ceiling_height_m - s->p_WB_m.z[lane];
+    const bool near = room < w->model->reach_m + NEAR_MARGIN_M;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const bool may_touch = near && (w->foot[i] == IVL_SIM_FOOT_FREE) && !w->detached[i];
-        gap[i] = may_touch ? height - s->p_foot_W_m[i].z[lane] - raw->leg_foot_radius_m : FAR_M;
+        gap[i] = may_touch ? raw->world_ceiling_height_m - s->p_foot_W_m[i].z[lane] - raw->leg_foot_radius_m : FAR_M;
     }
+    const ivl_d3_t up = near ? up_of(s, lane) : ivl_d3(0.0, 0.0, 1.0);
     for (int i = 0; i < IVL_SIM_PLATES; i++)
     {
-        gap[IVL_SIM_LEGS + i] = (near && !w->plate_touched[i]) ? plate_gap(w->model, s, lane, i) : FAR_M;
+        const bool may_touch = near && !w->plate_touched[i];
+        gap[IVL_SIM_LEGS + i] = may_touch ? room - ivl_sim_plate_top(&w->model->plate[i], up) : FAR_M;
     }
 }
 
@@ -166,11 +164,12 @@ static double first_zero(double g0, double d0, double g1, double d1, double tole
 }
 
 /// Share of the tried step after which the earliest event happens.
-static double event_share(const ivl_sim_group_t *group, int lane)
+static double event_share(ivl_sim_group_t *group, int lane)
 {
-    const ivl_sim_world_t *w = &group->world[lane];
+    ivl_sim_world_t *w = &group->world[lane];
     const double *g0 = w->trial.gap_m, dt = w->trial.dt_s;
-    double g1[IVL_SIM_GAPS], share = NO_EVENT;
+    double share = NO_EVENT;
+    double *g1 = w->trial.gap_after_m;
     gaps(w, &group->next, lane, g1);
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
@@ -343,7 +342,14 @@ static void propose(ivl_sim_group_t *group, int lane, double dt)
 static void begin_step(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t *w = &group->world[lane];
-    gaps(w, &group->state, lane, w->trial.gap_m);
+    if (w->restart)
+    {
+        gaps(w, &group->state, lane, w->trial.gap_m);
+    }
+    else
+    {
+        memcpy(w->trial.gap_m, w->trial.gap_after_m, sizeof w->trial.gap_m);
+    }
     handle_touches(group, lane, w->trial.gap_m);
     w->trial.starting = w->restart;
     w->restart = false;
@@ -382,6 +388,7 @@ static void accept(ivl_sim_group_t *group, int lane)
     ivl_sim_world_t *w = &group->world[lane];
     if (w->trial.starting)
     {
+        gaps(w, &group->next, lane, w->trial.gap_after_m);
         return;
     }
     w->rotor = w->trial.rotor;
@@ -393,18 +400,38 @@ static void accept(ivl_sim_group_t *group, int lane)
     grade_step(w, false);
 }
 
-/// state = next and last = rate, in the lanes where the step stands.
-static void commit(ivl_sim_group_t *group, ivl_mask_t stands)
+/// One lane of a struct that is made of wide numbers only.
+static void copy_lane(void *to, const void *from, size_t size, int lane)
 {
-    ivl_wide_t *state = (ivl_wide_t *)&group->state, *last = (ivl_wide_t *)&group->last;
-    const ivl_wide_t *next = (const ivl_wide_t *)&group->next, *rate = (const ivl_wide_t *)&group->rate;
-    for (size_t i = 0; i < sizeof group->state / sizeof *state; i++)
+    double *t = to;
+    const double *f = from;
+    for (size_t i = (size_t)lane; i < size / sizeof *t; i += IVL_SIM_LANES)
     {
-        state[i] = ivl_wide_select(stands, next[i], state[i]);
+        t[i] = f[i];
     }
-    for (size_t i = 0; i < sizeof group->last / sizeof *last; i++)
+}
+
+/// state = next and last = rate, in the lanes where the step stands.
+static void commit(ivl_sim_group_t *group, const bool stands[IVL_SIM_LANES])
+{
+    bool all = true;
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        last[i] = ivl_wide_select(stands, rate[i], last[i]);
+        all = all && stands[lane];
+    }
+    if (all)
+    {
+        group->state = group->next;
+        group->last = group->rate;
+        return;
+    }
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        if (stands[lane])
+        {
+            copy_lane(&group->state, &group->next, sizeof group->state, lane);
+            copy_lane(&group->last, &group->rate, sizeof group->last, lane);
+        }
     }
 }
 
@@ -415,8 +442,7 @@ bool ivl_sim_world_ready(const ivl_sim_group_t *group, int lane)
 
 void ivl_sim_group_step(ivl_sim_group_t *group)
 {
-    ivl_mask_t stands;
-    bool moving[IVL_SIM_LANES];
+    bool stands[IVL_SIM_LANES], moving[IVL_SIM_LANES];
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
         moving[lane] = group->active[lane] && !ivl_sim_world_ready(group, lane);
@@ -433,12 +459,11 @@ void ivl_sim_group_step(ivl_sim_group_t *group)
                      &group->rate);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        stands[lane] = 0;
-        if (moving[lane] && judge(group, lane))
+        stands[lane] = moving[lane] && judge(group, lane);
+        if (stands[lane])
         {
             accept(group, lane);
             group->world[lane].trial.n_try = 0;
-            stands[lane] = -1;
         }
     }
     commit(group, stands);

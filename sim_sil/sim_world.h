@@ -27,7 +27,8 @@ typedef struct
 {
     double dt_s;
     ivl_sim_rotor_t rotor; ///< after the step
-    double gap_m[IVL_SIM_GAPS]; ///< before the step
+    double gap_m[IVL_SIM_GAPS];       ///< before the step
+    double gap_after_m[IVL_SIM_GAPS]; ///< after it; before the next
     int n_try;             ///< 0 at first; more while a contact is being located
     bool starting;         ///< evaluates only: the forces have jumped
 } ivl_sim_trial_t;
