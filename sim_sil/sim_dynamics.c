@@ -221,11 +221,16 @@ IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n)
     const ivl_wide_t c = ivl_w3_dot_d3(n, e1), s = ivl_w3_dot_d3(n, e2), t = ivl_w3_dot_d3(n, e3);
     const ivl_wide_t root = ivl_wide_sqrt(c * c + s * s);
     const ivl_wide_t least = ivl_wide(COS_SIDEWAYS_MIN);
-    const ivl_wide_t inv = 1.0 / ivl_wide_select(root > least, root, least);
+    const ivl_wide_t lever = ivl_wide_select(root > least, root, least);
+    // three quotients from one division: divisions are what an evaluation spends most of its time on
+    const ivl_angle_t a = ivl_wide_fold(s, c), b = ivl_wide_fold(t, root);
+    const ivl_wide_t both = a.den * b.den;
+    const ivl_wide_t reciprocal = 1.0 / (both * lever);
+    const ivl_wide_t inv = both * reciprocal;
     const ivl_wide_t ca = c * inv, sa = s * inv;
     hinge_t h;
-    h.alpha = ivl_wide_atan2(s, c);
-    h.beta = ivl_wide_atan2(t, root);
+    h.alpha = ivl_wide_unfold(&a, a.num * b.den * lever * reciprocal);
+    h.beta = ivl_wide_unfold(&b, b.num * a.den * lever * reciprocal);
     h.inv_cos_beta = inv;
     h.e_alpha = (ivl_w3_t){ca * e2.x - sa * e1.x, ca * e2.y - sa * e1.y, ca * e2.z - sa * e1.z};
     h.e_beta = (ivl_w3_t){root * e3.x - t * (ca * e1.x + sa * e2.x), root * e3.y - t * (ca * e1.y + sa * e2.y),
@@ -272,25 +277,28 @@ IVL_SIM_INLINE row_t constraint_row(const ivl_sim_model_t *model, const ivl_sim_
     return r;
 }
 
-/// Solves the symmetric positive definite system a x = b of four equations, L D L^T.
+/// Solves the symmetric positive definite system a x = b of four equations, upper triangle given, by elimination of the
+/// first two unknowns at once: two divisions in a row instead of four.
 IVL_SIM_INLINE void solve4(ivl_wide_t a[4][4], const ivl_wide_t b[4], ivl_wide_t x[4])
 {
-    const ivl_wide_t d0 = 1.0 / a[0][0];
-    const ivl_wide_t l10 = a[0][1] * d0, l20 = a[0][2] * d0, l30 = a[0][3] * d0;
-    const ivl_wide_t d1 = 1.0 / (a[1][1] - l10 * a[0][1]);
-    const ivl_wide_t u21 = a[1][2] - l10 * a[0][2], u31 = a[1][3] - l10 * a[0][3];
-    const ivl_wide_t l21 = u21 * d1, l31 = u31 * d1;
-    const ivl_wide_t d2 = 1.0 / (a[2][2] - l20 * a[0][2] - l21 * u21);
-    const ivl_wide_t u32 = a[2][3] - l20 * a[0][3] - l21 * u31;
-    const ivl_wide_t l32 = u32 * d2;
-    const ivl_wide_t d3 = 1.0 / (a[3][3] - l30 * a[0][3] - l31 * u31 - l32 * u32);
-    const ivl_wide_t y1 = b[1] - l10 * b[0];
-    const ivl_wide_t y2 = b[2] - l20 * b[0] - l21 * y1;
-    const ivl_wide_t y3 = b[3] - l30 * b[0] - l31 * y1 - l32 * y2;
-    x[3] = y3 * d3;
-    x[2] = y2 * d2 - l32 * x[3];
-    x[1] = y1 * d1 - l21 * x[2] - l31 * x[3];
-    x[0] = b[0] * d0 - l10 * x[1] - l20 * x[2] - l30 * x[3];
+    // inverse of the leading block
+    const ivl_wide_t d = 1.0 / (a[0][0] * a[1][1] - a[0][1] * a[0][1]);
+    const ivl_wide_t p00 = a[1][1] * d, p01 = -a[0][1] * d, p11 = a[0][0] * d;
+    // y = inverse * right part, and of the right-hand side
+    const ivl_wide_t y02 = p00 * a[0][2] + p01 * a[1][2], y12 = p01 * a[0][2] + p11 * a[1][2];
+    const ivl_wide_t y03 = p00 * a[0][3] + p01 * a[1][3], y13 = p01 * a[0][3] + p11 * a[1][3];
+    const ivl_wide_t z0 = p00 * b[0] + p01 * b[1], z1 = p01 * b[0] + p11 * b[1];
+    // what remains for the last two unknowns
+    const ivl_wide_t s22 = a[2][2] - a[0][2] * y02 - a[1][2] * y12;
+    const ivl_wide_t s23 = a[2][3] - a[0][2] * y03 - a[1][2] * y13;
+    const ivl_wide_t s33 = a[3][3] - a[0][3] * y03 - a[1][3] * y13;
+    const ivl_wide_t r2 = b[2] - a[0][2] * z0 - a[1][2] * z1;
+    const ivl_wide_t r3 = b[3] - a[0][3] * z0 - a[1][3] * z1;
+    const ivl_wide_t e = 1.0 / (s22 * s33 - s23 * s23);
+    x[2] = (s33 * r2 - s23 * r3) * e;
+    x[3] = (s22 * r3 - s23 * r2) * e;
+    x[0] = z0 - y02 * x[2] - y03 * x[3];
+    x[1] = z1 - y12 * x[2] - y13 * x[3];
 }
 
 /// Solves  M u = b + J^T x,  J u + compliance x = r  for the twist u and the multipliers x.        [MODEL eq. 4.10]
@@ -299,24 +307,29 @@ IVL_SIM_INLINE void solve_constrained(const ivl_wide_t inverse6[IVL_SIM_PACKED],
                                       ivl_wide_t x[IVL_SIM_LEGS])
 {
     ivl_wide_t J[IVL_SIM_LEGS][N], W[IVL_SIM_LEGS][N], A[4][4], rhs[4];
+    IVL_SIM_UNROLL
     for (int leg = 0; leg < IVL_SIM_LEGS; leg++)
     {
         const ivl_wide_t row[N] = {rows[leg].g.x,       rows[leg].g.y,       rows[leg].g.z,
                                    rows[leg].hip_x_g.x, rows[leg].hip_x_g.y, rows[leg].hip_x_g.z};
         rhs[leg] = r[leg];
+        IVL_SIM_UNROLL
         for (int i = 0; i < N; i++)
         {
             J[leg][i] = row[i];
             W[leg][i] = inverse6[packed(i, 0)] * row[0];
+            IVL_SIM_UNROLL
             for (int j = 1; j < N; j++)
             {
                 W[leg][i] += inverse6[packed(i, j)] * row[j];
             }
             rhs[leg] -= W[leg][i] * b[i];
         }
+        IVL_SIM_UNROLL
         for (int other = 0; other <= leg; other++)
         {
             A[other][leg] = W[leg][0] * J[other][0];
+            IVL_SIM_UNROLL
             for (int i = 1; i < N; i++)
             {
                 A[other][leg] += W[leg][i] * J[other][i];
@@ -325,13 +338,16 @@ IVL_SIM_INLINE void solve_constrained(const ivl_wide_t inverse6[IVL_SIM_PACKED],
         A[leg][leg] += rows[leg].compliance;
     }
     solve4(A, rhs, x);
+    IVL_SIM_UNROLL
     for (int i = 0; i < N; i++)
     {
         u[i] = inverse6[packed(i, 0)] * b[0];
+        IVL_SIM_UNROLL
         for (int j = 1; j < N; j++)
         {
             u[i] += inverse6[packed(i, j)] * b[j];
         }
+        IVL_SIM_UNROLL
         for (int leg = 0; leg < IVL_SIM_LEGS; leg++)
         {
             u[i] += W[leg][i] * x[leg];
@@ -418,6 +434,7 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
     ivl_w3_t f_foot[IVL_SIM_LEGS], centripetal[IVL_SIM_LEGS];
     row_t rows[IVL_SIM_LEGS];
     body_wrench(model, load, &k, s->p_WB_m.z, b, rate->overlap_m);
+    IVL_SIM_UNROLL
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const ivl_d3_t hip = leg->hip_B_m[i];
@@ -459,6 +476,7 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
     const ivl_w3_t a = {u[0], u[1], u[2]}, alpha = {u[3], u[4], u[5]};
     rate->a_WB_mps2 = ivl_wrot_apply(&k.R_WB, a);
     rate->alpha_B_radps2 = alpha;
+    IVL_SIM_UNROLL
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const ivl_w3_t a_hip = ivl_w3_add(ivl_w3_add(a, centripetal[i]), ivl_w3_cross_d3(alpha, leg->hip_B_m[i]));
@@ -566,6 +584,15 @@ static void spread(const ivl_sim_kin_t *kin, ivl_sim_state_t *state)
     }
 }
 
+static void spread_contact(ivl_sim_contact_t *contact)
+{
+    double *number = (double *)contact;
+    for (size_t i = 0; i < offsetof(ivl_sim_contact_t, any_sliding) / sizeof *number; i++)
+    {
+        number[i] = number[i - i % IVL_SIM_LANES];
+    }
+}
+
 static ivl_d3_t first(ivl_w3_t a)
 {
     return ivl_d3(a.x[0], a.y[0], a.z[0]);
@@ -581,10 +608,8 @@ void ivl_sim_impulse(const ivl_sim_model_t *model, const ivl_sim_foot_t foot[IVL
     ivl_w3_t jump[IVL_SIM_LEGS], v_foot[IVL_SIM_LEGS];
     row_t rows[IVL_SIM_LEGS];
     memset(&contact, 0, sizeof contact);
-    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
-    {
-        ivl_sim_contact_set(model, &contact, lane, foot);
-    }
+    ivl_sim_contact_set(model, &contact, 0, foot);
+    spread_contact(&contact);
     spread(kin, &s);
     kinematics(model, &s, &k);
     for (int i = 0; i < IVL_SIM_LEGS; i++)

@@ -14,6 +14,13 @@
 // Vectors are passed by value only between inlined functions, so how the ABI would pass them does not matter.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
+// Short loops over matrix elements are written out, so that their indices cost nothing.
+#if defined(__clang__)
+#define IVL_SIM_UNROLL _Pragma("unroll")
+#else
+#define IVL_SIM_UNROLL _Pragma("GCC unroll 8")
+#endif
+
 #define IVL_SIM_INLINE static inline __attribute__((always_inline))
 
 static const double IVL_SIM_PI = 3.14159265358979323846;
@@ -252,28 +259,52 @@ static const double IVL_SIM_ATANH[8] = {0.99999999999999999887, 0.33333333333333
                                         0.14285714380320839941, 0.11111098528363023304, 0.090918158401146644019,
                                         0.07656264074182095483, 0.074048551803276383491};
 
-/// Angle of the point (c, s) from the first axis, in [-pi, pi].
-IVL_SIM_INLINE ivl_wide_t ivl_wide_atan2(ivl_wide_t s, ivl_wide_t c)
+/// An angle whose arcus tangent is still to be taken: atan2 up to its one division, num / den in [-0.42, 0.42].
+typedef struct
+{
+    ivl_wide_t num, den;
+    ivl_mask_t swap, turn, mirror, negative;
+} ivl_angle_t;
+
+/// Folds the point (c, s) into the first octant; beyond tan(pi/8) turns it by pi/4.  den > 0 always.
+IVL_SIM_INLINE ivl_angle_t ivl_wide_fold(ivl_wide_t s, ivl_wide_t c)
 {
     const ivl_wide_t zero = ivl_wide(0.0);
     const ivl_wide_t abs_s = ivl_wide_abs(s), abs_c = ivl_wide_abs(c);
-    // first octant: t = lo/hi in [0, 1]; beyond tan(pi/8) turn by pi/4: t = (lo - hi)/(lo + hi)
-    const ivl_mask_t swap = abs_s > abs_c;
-    const ivl_wide_t lo = ivl_wide_select(swap, abs_c, abs_s);
-    const ivl_wide_t hi = ivl_wide_select(swap, abs_s, abs_c);
-    const ivl_mask_t turn = lo > 0.41421356237309504880 * hi;
-    const ivl_wide_t den = ivl_wide_select(turn, lo + hi, hi);
-    const ivl_wide_t t = ivl_wide_select(turn, lo - hi, lo) / ivl_wide_select(den > zero, den, ivl_wide(1.0));
+    ivl_angle_t a;
+    a.swap = abs_s > abs_c;
+    a.mirror = c < zero;
+    a.negative = s < zero;
+    const ivl_wide_t lo = ivl_wide_select(a.swap, abs_c, abs_s);
+    const ivl_wide_t hi = ivl_wide_select(a.swap, abs_s, abs_c);
+    a.turn = lo > 0.41421356237309504880 * hi;
+    a.num = ivl_wide_select(a.turn, lo - hi, lo);
+    const ivl_wide_t den = ivl_wide_select(a.turn, lo + hi, hi);
+    a.den = ivl_wide_select(den > zero, den, ivl_wide(1.0));
+    return a;
+}
+
+/// The angle, in [-pi, pi], given t = num / den.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_unfold(const ivl_angle_t *a, ivl_wide_t t)
+{
     const ivl_wide_t u = t * t;
     ivl_wide_t p = ivl_wide(IVL_SIM_ATAN[10]);
+    IVL_SIM_UNROLL
     for (int k = 9; k >= 0; k--)
     {
         p = p * u + IVL_SIM_ATAN[k];
     }
-    p = p * t + ivl_wide_select(turn, ivl_wide(0.25 * IVL_SIM_PI), zero);
-    p = ivl_wide_select(swap, 0.5 * IVL_SIM_PI - p, p);
-    p = ivl_wide_select(c < zero, IVL_SIM_PI - p, p);
-    return ivl_wide_select(s < zero, -p, p);
+    p = p * t + ivl_wide_select(a->turn, ivl_wide(0.25 * IVL_SIM_PI), ivl_wide(0.0));
+    p = ivl_wide_select(a->swap, 0.5 * IVL_SIM_PI - p, p);
+    p = ivl_wide_select(a->mirror, IVL_SIM_PI - p, p);
+    return ivl_wide_select(a->negative, -p, p);
+}
+
+/// Angle of the point (c, s) from the first axis, in [-pi, pi].
+IVL_SIM_INLINE ivl_wide_t ivl_wide_atan2(ivl_wide_t s, ivl_wide_t c)
+{
+    const ivl_angle_t a = ivl_wide_fold(s, c);
+    return ivl_wide_unfold(&a, a.num / a.den);
 }
 
 IVL_SIM_INLINE double ivl_sim_atan2(double s, double c)

@@ -119,6 +119,7 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
     memset(model, 0, sizeof *model);
     model->raw = *raw;
     model->firmware = *firmware;
+    model->core = ivl_sim_core_linked;
     derive_legs(model);
     derive_plate(&model->plate[IVL_SIM_PROP_PLATE], raw->prop_plate_size_x_m, raw->prop_plate_size_y_m,
                  raw->prop_plate_size_z_m, raw->prop_plate_center_z_m);

@@ -10,6 +10,7 @@
 #include <stddef.h>
 
 #include "ivl.h"
+#include "sim_core.h"
 #include "sim_math.h"
 #include "sim_params.h"
 
@@ -60,6 +61,7 @@ typedef struct
     double reach_m; ///< largest distance of any point of the vehicle from the body origin
     ivl_cfg_t firmware;
     double tick_s; ///< of the firmware
+    ivl_sim_core_t core; ///< where the firmware runs
 } ivl_sim_model_t;
 
 /// Checks raw parameters and derives the model.

@@ -52,7 +52,7 @@ static bool start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec)
     const ivl_policy_t policy = {.seq = 1,
                                  .rrev_c_per_s = at_once ? 0.0f : (float)spec->rrev_c_per_s[0],
                                  .moment_y_Nm = (float)(spec->moment_y_Nmm[0] * 1.0e-3)};
-    return ivl_policy_commit(&model->firmware, &world->firmware, &policy) == IVL_OK;
+    return model->core.commit(group->port, lane, &model->firmware, &world->firmware, &policy) == IVL_OK;
 }
 
 static void clear(ivl_sim_outcome_t *o)
@@ -260,6 +260,7 @@ void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *co
     ivl_sim_job_t job[IVL_SIM_LANES];
     bool any = false;
     ivl_sim_group_init(model, &group);
+    group.port = model->core.open(model->core.context);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
         refill(&group, lane, source, context, &job[lane]);
@@ -278,4 +279,5 @@ void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *co
             any = any || group.active[lane];
         }
     }
+    model->core.close(group.port);
 }

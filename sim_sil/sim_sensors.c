@@ -102,6 +102,11 @@ static void read_attitude(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng
                           uint32_t tick, ivl_in_t *in)
 {
     const double *q = state->q_WB;
+    if (!(model->raw.sense_attitude_noise_rad > 0.0))
+    {
+        in->q_WB = (ivl_quat_t){to_float(q[0]), to_float(q[1]), to_float(q[2]), to_float(q[3])};
+        return;
+    }
     double e[3] = {0.0, 0.0, 0.0};
     add_noise(rng, IVL_SIM_DRAW_ATTITUDE, tick, 0.5 * model->raw.sense_attitude_noise_rad, e);
     // q (e, 1), normalised: a small rotation by 2 e in the body's axes

@@ -95,7 +95,7 @@ void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *
     ivl_sim_rotor_init(model, &w->rotor);
     draw_scatter(w);
     ivl_sim_sensors_init(model, rng, &kin, &w->sensors);
-    ivl_init(&model->firmware, &w->firmware);
+    model->core.init(group->port, lane, &model->firmware, &w->firmware);
     ivl_sim_world_place(group, lane, &kin);
     group->active[lane] = true;
 }
@@ -317,7 +317,8 @@ static double choose_step(const ivl_sim_world_t *w, bool plates)
             step = wait;
         }
     }
-    return (step < w->left_s) ? w->left_s / ceil(w->left_s / step - 1.0e-6) : w->left_s;
+    // an excess of rounding size is no reason for two steps
+    return (step < w->left_s * (1.0 - 1.0e-6)) ? w->left_s / ceil(w->left_s / step - 1.0e-6) : w->left_s;
 }
 
 /// Sets up lane `lane` for a step of length dt.
@@ -371,7 +372,7 @@ static bool judge(ivl_sim_group_t *group, int lane)
     {
         return true;
     }
-    const double most = choose_step(w, plates_press(&group->rate, lane));
+    const double most = plates_press(&group->rate, lane) ? choose_step(w, true) : w->trial.dt_s;
     const double share = (w->trial.n_try < LOCATE_MAX) ? event_share(group, lane) : NO_EVENT;
     const double dt = (share < 1.0) ? share * w->trial.dt_s : w->trial.dt_s;
     if (dt < w->trial.dt_s || most < w->trial.dt_s - TIME_SLACK_S)
@@ -493,6 +494,17 @@ void ivl_sim_group_advance(ivl_sim_group_t *group, double dt_s)
     }
 }
 
+static void body_of(const ivl_sim_state_t *s, int lane, ivl_sim_kin_t *kin)
+{
+    ivl_d3_store(kin->p_WB_m, ivl_d3(s->p_WB_m.x[lane], s->p_WB_m.y[lane], s->p_WB_m.z[lane]));
+    ivl_d3_store(kin->v_WB_mps, ivl_d3(s->v_WB_mps.x[lane], s->v_WB_mps.y[lane], s->v_WB_mps.z[lane]));
+    ivl_d3_store(kin->w_B_radps, ivl_d3(s->w_B_radps.x[lane], s->w_B_radps.y[lane], s->w_B_radps.z[lane]));
+    for (int i = 0; i < 4; i++)
+    {
+        kin->q_WB[i] = s->q_WB[i][lane];
+    }
+}
+
 void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t *w = &group->world[lane];
@@ -501,12 +513,13 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
     w->t_s = (double)w->n_tick * model->tick_s;
     w->n_tick++;
     w->left_s = (double)w->n_tick * model->tick_s - w->t_s;
-    if (!ivl_motors_latched_off(&w->firmware))
+    if (model->core.every_tick || !ivl_motors_latched_off(&w->firmware))
     {
-        const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
+        ivl_sim_kin_t kin; // of which sensors need the body's part
+        body_of(&group->state, lane, &kin);
         const double a[3] = {group->last.a_WB_mps2.x[lane], group->last.a_WB_mps2.y[lane], group->last.a_WB_mps2.z[lane]};
         ivl_sim_sensors_read(model, &w->rng, &kin, a, w->t_s, &w->sensors, &w->in);
-        ivl_step(&model->firmware, &w->firmware, &w->in, &w->out);
+        model->core.step(group->port, lane, &model->firmware, &w->firmware, &w->in, &w->out);
         ivl_sim_rotor_command(model, &w->rotor, w->out.thrust_N);
     }
 }

@@ -62,6 +62,7 @@ typedef struct
 typedef struct
 {
     const ivl_sim_model_t *model;
+    void *port; ///< of the flight cores
     ivl_sim_state_t state, next;
     ivl_sim_rate_t last, rate;
     ivl_sim_contact_t contact;
