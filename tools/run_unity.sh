@@ -1,11 +1,12 @@
 #!/bin/sh
 # Runs one Unity test program: one line when it passes, everything that it printed when it does not.
-# usage: run_unity.sh PROGRAM      fails on a failed test, a crash, an ignored test, or no test at all
+# usage: [RUNNER=COMMAND] run_unity.sh PROGRAM      fails on a failed test, a crash, an ignored test, or no test at all
 set -eu
 program=$1
+runner=${RUNNER:-}
 
 status=0
-"$program" > "$program.log" 2>&1 || status=$?
+$runner "$program" > "$program.log" 2>&1 || status=$?
 summary=$(grep -E '^[0-9]+ Tests [0-9]+ Failures [0-9]+ Ignored' "$program.log" || true)
 case $summary in
     '' | '0 Tests '* | *[1-9]' Ignored'* | *[1-9]0' Ignored'*) passed=false ;;
