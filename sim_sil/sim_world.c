@@ -229,8 +229,7 @@ static void handle_touches(ivl_sim_group_t *group, int lane, const double gap[IV
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
         const bool is_foot = i < IVL_SIM_LEGS;
-        if (gap[i] > (is_foot ? FOOT_TOLERANCE_M : PLATE_TOLERANCE_M) ||
-            (is_foot && !(group->state.v_foot_W_mps[i].z[lane] > 0.0)))
+        if (gap[i] > (is_foot ? FOOT_TOLERANCE_M : PLATE_TOLERANCE_M))
         {
             continue;
         }
