@@ -43,6 +43,7 @@ FLAGS_unity   := -DUNITY_INCLUDE_DOUBLE -DUNITY_SUPPORT_64 -DUNITY_OUTPUT_CHAR=u
 FLAGS_tests/c := $(FLAGS_unity) -Itests/c
 FUZZ_FLIGHTS  ?= 400
 FLAGS_test_ivl_fuzz := -DN_FLIGHTS=$(FUZZ_FLIGHTS)
+FLAGS_test_ivl_math := -DSWEEP_STRIDE=97
 # the start-up code fills and clears memory: its loops must not become calls to themselves
 FLAGS_startup := -fno-builtin
 
