@@ -5,6 +5,12 @@ world = ivl.World(vehicle="habas2021", gear="wide_long", gear_set="as_simulated"
 out = world.rollouts(2.5, 90.0, rrev_c_per_s=4.8, moment_y_Nmm=8.0)
 """
 
+import os
+
+# The matrices here are small: more BLAS threads only cost time, and their number changes the last bits of a search.
+# It has to be said before numpy is loaded; a caller who has said otherwise is respected.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 from ivl.errors import ConfigError, IvlError, LearnerError, NativeError, RolloutError, StoreError
 from ivl.experiment import Experiment
 from ivl.learners import EPHE, Learner, RobustEPHE, make_learner

@@ -25,6 +25,7 @@ DEFAULT_LIBRARY = Path(__file__).parent / "_native" / "libivl_sil.so"
 
 TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED = range(5)
 _ERROR_BYTES = 256
+_TRACE_ROWS = 1024  # first guess; the call says when it needs more
 _FIELD_TYPES = {"f8": 8, "f4": 4, "i4": 4, "u4": 4, "u8": 8, "i8": 8, "i1": 1, "u1": 1}
 
 
@@ -166,7 +167,7 @@ class NativeModel:
     def trace(self, spec: npt.NDArray[np.void], period_s: float) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """Fly one spec and record it every `period_s`; returns (rows, outcome of shape (1,))."""
         outcome = np.zeros(1, dtype=self._library.outcome_dtype)
-        rows = np.zeros(1024, dtype=self._library.trace_dtype)
+        rows = np.zeros(_TRACE_ROWS, dtype=self._library.trace_dtype)
         for _ in range(2):
             n_rows = self._trace_into(spec, period_s, rows, outcome)
             if n_rows <= rows.size:

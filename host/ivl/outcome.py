@@ -35,12 +35,7 @@ def as_dict(outcome: Any, end_reason: str) -> dict[str, Any]:
     """One outcome record as plain data for JSON: NaN becomes None, `end_reason` its name."""
     result: dict[str, Any] = {}
     for name in outcome.dtype.names:
-        value = outcome[name]
-        if isinstance(value, np.ndarray):
-            result[name] = value.tolist()
-        elif isinstance(value, np.floating):
-            result[name] = float(value) if np.isfinite(value) else None
-        else:
-            result[name] = int(value)
+        value = np.asarray(outcome[name]).tolist()
+        result[name] = None if isinstance(value, float) and not np.isfinite(value) else value
     result["end_reason"] = end_reason
     return result

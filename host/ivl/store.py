@@ -8,7 +8,7 @@ SQLite in WAL mode with synchronous=FULL: a commit is on the disk when it return
 not at all. An episode passes three commits: *planned* (policies and the learners' states after `ask`), *scored* (each
 portion of outcomes as it comes), *told* (episode rows and the learners' states after `tell`). What is between two
 commits is repeated on resume with the same random numbers, so a continued run equals an uninterrupted one bit for
-bit. SQLite stores float64 exactly; NaN is stored as NULL.
+bit. SQLite stores float64 exactly, but for the sign of a zero; NaN is stored as NULL.
 """
 
 import fcntl

@@ -101,6 +101,10 @@ def _correlation(a: FloatArray, b: FloatArray, lengths: FloatArray) -> FloatArra
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    """A matrix square root; eigenvalues that rounding made negative count as zero."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+    """Cholesky factor; where rounding has made the matrix indefinite, with the smallest jitter that repairs it."""
+    jitter = _JITTER
+    while True:
+        try:
+            return np.asarray(np.linalg.cholesky(covariance + jitter * np.eye(len(covariance))), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            jitter *= 10.0

@@ -54,16 +54,22 @@ def draw(
         axes[i].set_ylabel(LABELS[name])
     _draw_rate(axes[2], experiment, history)
     axes[2].set_xlabel("rollout")
-    if converged_at is not None:
-        for axis in axes:
+    for axis in axes:
+        axis.set_xlim(0, experiment.budget)
+        style.finish(axis)
+        if converged_at is not None:
             axis.axvline(converged_at, color=style.GREY, linewidth=1, linestyle=":")
-        axes[2].annotate(f" solved after {converged_at}", (converged_at, 0.03), color=style.GREY, fontsize=8)
+    if converged_at is not None:
+        text = f"solved after {converged_at} "
+        axes[2].text(converged_at, 0.96, text, ha="right", va="top", color=style.GREY, fontsize=style.SMALL)
     axes[0].set_title(
         f"{experiment.name}: {experiment.gear_set}/{experiment.gear}, {experiment.speed_mps:g} m/s at "
         f"{experiment.angle_deg:g}°, {experiment.learner.name}, seed {experiment.seed}",
-        fontsize=9,
+        fontsize=style.NORMAL,
     )
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=style.SMALL, frameon=False
+    )
     return style.save(figure, paths)
 
 
@@ -94,7 +100,7 @@ def _draw_rate(axis: Axes, experiment: Experiment, history: Sequence[EpisodeRow]
     axis.bar(at - experiment.n_rollouts / 2, rates, width=0.85 * experiment.n_rollouts, color=style.GREEN, alpha=0.35)
     axis.plot(at, recent, color=style.BLUE, linewidth=1.2)
     axis.set_ylim(0, 1.05)
-    axis.set_ylabel("four-leg landing rate\n(bars: episode, line: last three)", fontsize=8)
+    axis.set_ylabel("four-leg rate\n(line: last three)")
 
 
 def outcome_classes(rollouts: RolloutRows) -> list[npt.NDArray[np.bool_]]:

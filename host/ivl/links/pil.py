@@ -1,0 +1,118 @@
+"""Processor in the loop: the simulator flies, and an emulated STM32F405 decides each tick.
+
+The chip is emulated by QEMU in a child process that runs the flight core's own object code for that processor; each
+tick is one exchange over its standard input and output. Every worker thread has a chip of its own.
+"""
+
+import ctypes
+import os
+import weakref
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ivl import native
+from ivl.errors import ConfigError, RolloutError
+from ivl.experiment import Experiment
+from ivl.source import Flown, Plan, WorldSource
+from ivl.world import World
+
+IMAGE = native.DEFAULT_LIBRARY.parent / "stm32f405.elf"
+QEMU_ENV = "IVL_QEMU"  # another emulator
+_ERROR_BYTES = 256
+
+
+def qemu_command(image: Path) -> list[str]:
+    """Command line that runs `image` with its standard input and output as the only way in and out."""
+    return [
+        os.environ.get(QEMU_ENV, "qemu-system-arm"), "-M", "netduinoplus2", "-display", "none", "-monitor", "none",
+        "-serial", "none", "-semihosting-config", "enable=on,target=native", "-kernel", str(image),
+    ]  # fmt: skip
+
+
+class Chips:
+    """Emulated chips that run flight cores; more are started when several threads fly at once."""
+
+    def __init__(self, command: list[str]) -> None:
+        """Start the first chip.
+
+        Raises:
+            RolloutError: It cannot be started, or does not speak our language.
+        """
+        self._c = _declare(native.library().c)
+        words = (ctypes.c_char_p * (len(command) + 1))(*(word.encode() for word in command), None)
+        message = ctypes.create_string_buffer(_ERROR_BYTES)
+        handle = self._c.ivl_pil_create(words, message, _ERROR_BYTES)
+        if not handle:
+            raise RolloutError(message.value.decode())
+        self._handle = ctypes.c_void_p(handle)
+        self._finalizer = weakref.finalize(self, self._c.ivl_pil_free, self._handle)
+
+    def attach(self, world: World) -> None:
+        """Let the chips decide all landings of `world` from now on; the world keeps them alive."""
+        self._c.ivl_pil_attach(self._handle, world.native_model.handle)
+        weakref.finalize(world, _keep, self)
+
+    def check(self) -> None:
+        """Raise RolloutError if a chip has failed: what was flown since the last check is void."""
+        message = bytes(self._c.ivl_pil_error(self._handle)).decode()
+        if message:
+            raise RolloutError(message)
+
+    @property
+    def n_ticks(self) -> int:
+        """Ticks decided by chips so far."""
+        return int(self._c.ivl_pil_ticks(self._handle))
+
+    @property
+    def n_chips(self) -> int:
+        """Chips that were started."""
+        return int(self._c.ivl_pil_chips(self._handle))
+
+
+class PilSource:
+    """The simulator with the flight core on emulated chips; a whole plan in one batch."""
+
+    def __init__(self, uri: str, experiment: Experiment, threads: int | None = None) -> None:
+        """Fly the experiment's approach; `uri` is pil:// or pil:///path/of/image.elf.
+
+        Raises:
+            ConfigError: The image is missing.
+            RolloutError: The emulator cannot be started.
+        """
+        image = Path(uri.removeprefix("pil://") or IMAGE)
+        if not image.is_file():
+            raise ConfigError(f"{uri}: {image} is missing: run `make firmware`")
+        self.world = experiment.make_world()
+        self.chips = Chips(qemu_command(image))
+        self.chips.attach(self.world)
+        self._source = WorldSource(self.world, experiment, threads)
+
+    def fly(self, plan: Plan) -> Iterator[Flown]:
+        """Fly the plan; one portion with everything.
+
+        Raises:
+            RolloutError: A chip failed; nothing of this plan is yielded.
+        """
+        for flown in self._source.fly(plan):
+            self.chips.check()
+            yield flown
+
+
+def _keep(_: Chips) -> None:
+    """Holds a reference until a world is gone."""
+
+
+def _declare(c: Any) -> Any:
+    ptr, size, text = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_char_p
+    for name, restype, argtypes in (
+        ("ivl_pil_create", ptr, (ctypes.POINTER(text), text, size)),
+        ("ivl_pil_attach", None, (ptr, ptr)),
+        ("ivl_pil_ticks", ctypes.c_uint64, (ptr,)),
+        ("ivl_pil_chips", ctypes.c_uint32, (ptr,)),
+        ("ivl_pil_error", text, (ptr,)),
+        ("ivl_pil_free", None, (ptr,)),
+    ):
+        function = getattr(c, name)
+        function.restype, function.argtypes = restype, list(argtypes)
+    return c

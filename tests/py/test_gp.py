@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from ivl.learners.gp import GaussianProcess, Hyper, fit
+
+HYPER = Hyper(np.array([0.2, 0.3]), 0.01)
+
+
+def data(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(size=(n, 2))
+    y = np.sin(5 * x[:, 0]) + x[:, 1] ** 2 + 0.05 * rng.standard_normal(n)
+    return x, (y - y.mean()) / y.std()
+
+
+def dense(x: np.ndarray, y: np.ndarray, at: np.ndarray, hyper: Hyper) -> tuple[np.ndarray, np.ndarray, float]:
+    """The textbook formulas with explicit inverses."""
+
+    def k(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.exp(-0.5 * (((a[:, None] - b[None]) / hyper.lengths) ** 2).sum(-1))
+
+    inverse = np.linalg.inv(k(x, x) + (hyper.noise + 1e-8) * np.eye(len(x)))
+    variance = y @ inverse @ y / len(x)
+    mean = k(at, x) @ inverse @ y
+    covariance = variance * (k(at, at) - k(at, x) @ inverse @ k(x, at))
+    sign, log_det = np.linalg.slogdet(inverse)
+    return mean, covariance, -0.5 * len(x) * np.log(variance) + 0.5 * sign * log_det
+
+
+def test_prediction_and_likelihood_equal_the_textbook_formulas() -> None:
+    x, y = data(30)
+    at = np.random.default_rng(1).uniform(size=(7, 2))
+    gp = GaussianProcess(x, y, HYPER)
+    mean, covariance, likelihood = dense(x, y, at, HYPER)
+    assert gp.predict(at)[0] == pytest.approx(mean, abs=1e-8)
+    assert gp.predict(at)[1] == pytest.approx(np.sqrt(np.diag(covariance)), abs=1e-6)
+    assert gp.log_likelihood() == pytest.approx(likelihood, abs=1e-6)
+
+
+def test_joint_draws_have_the_posterior_s_mean_and_covariance() -> None:
+    x, y = data(12)
+    at = np.random.default_rng(1).uniform(size=(4, 2))
+    draws = GaussianProcess(x, y, HYPER).sample(at, 40_000, np.random.default_rng(2))
+    mean, covariance, _ = dense(x, y, at, HYPER)
+    scale = np.sqrt(covariance.max())
+    assert draws.mean(axis=0) == pytest.approx(mean, abs=0.03 * scale)
+    assert np.cov(draws.T) == pytest.approx(covariance, abs=0.05 * scale**2)
+
+
+def test_fit_finds_hyper_parameters_better_than_where_it_began() -> None:
+    x, y = data(60)
+    prior = Hyper(np.array([0.05, 0.05]), 1.0)
+    found = fit(x, y, prior, prior)
+    gain = GaussianProcess(x, y, found).log_likelihood() - GaussianProcess(x, y, prior).log_likelihood()
+    assert gain > 10
+
+
+def test_fit_is_deterministic() -> None:
+    x, y = data(40)
+    first, second = (fit(x, y, HYPER, HYPER) for _ in range(2))
+    assert (first.log() == second.log()).all()
+
+
+@pytest.mark.parametrize("y", [np.zeros(6), np.ones(6)])
+def test_repeated_points_and_constant_values_are_survived(y: np.ndarray) -> None:
+    x = np.full((6, 2), 0.5)
+    hyper = fit(x, y, HYPER, HYPER)
+    mean, sd = GaussianProcess(x, y, hyper).predict(np.array([[0.5, 0.5], [0.0, 1.0]]))
+    assert np.isfinite(mean).all()
+    assert np.isfinite(sd).all()

@@ -1,0 +1,78 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ivl import native
+from ivl.errors import NativeError
+
+
+def test_load_says_how_to_build_when_the_library_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(NativeError, match=r"none\.so: the native library is missing: run `make build`"):
+        native.NativeLibrary(tmp_path / "none.so")
+
+
+def test_load_says_how_to_build_when_the_file_is_no_library(tmp_path: Path) -> None:
+    (tmp_path / "text.so").write_text("not a library")
+    with pytest.raises(NativeError, match=r"cannot be loaded .*run `make build`"):
+        native.NativeLibrary(tmp_path / "text.so")
+
+
+def test_load_refuses_another_interface_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native, "ABI_VERSION", native.ABI_VERSION + 1)
+    with pytest.raises(NativeError, match="interface version"):
+        native.NativeLibrary(native.library().path)
+
+
+def test_library_can_be_chosen_by_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.so"
+    copy.write_bytes(native.library().path.read_bytes())
+    monkeypatch.setenv(native.LIBRARY_ENV, str(copy))
+    assert native.library.__wrapped__().path == copy
+
+
+def test_tables_describe_fields_that_do_not_overlap_and_have_a_unit_and_a_doc() -> None:
+    library = native.library()
+    for fields, dtype in (
+        (library.spec_fields, library.spec_dtype),
+        (library.outcome_fields, library.outcome_dtype),
+        (library.trace_fields, library.trace_dtype),
+        (library.derived_fields, library.derived_dtype),
+    ):
+        end = 0
+        for field in sorted(fields.values(), key=lambda f: f.offset):
+            assert field.offset >= end
+            end = field.offset + dtype[field.name].itemsize
+            assert field.unit
+            assert field.doc
+        assert end <= dtype.itemsize
+
+
+def test_parameters_are_dotted_doubles_with_a_default_inside_the_range() -> None:
+    for field in native.library().params.values():
+        assert "." in field.name
+        assert (field.type, field.count) == ("f8", 1)
+        assert field.lo <= field.hi
+        assert field.default is None or field.lo <= field.default <= field.hi
+
+
+def test_create_model_passes_the_library_s_message_on_when_a_value_is_refused() -> None:
+    library = native.library()
+    values = np.array([field.default if field.default is not None else field.lo for field in library.params.values()])
+    values[list(library.params).index("body.mass")] = np.nan
+    with pytest.raises(NativeError, match=r"body\.mass"):
+        library.create_model(values)
+
+
+def test_create_model_refuses_a_vector_of_the_wrong_length() -> None:
+    with pytest.raises(NativeError, match=r"shape \(3,\)"):
+        native.library().create_model(np.zeros(3))
+
+
+def test_end_reasons_and_phases_have_distinct_names() -> None:
+    library = native.library()
+    for name, field in ((library.end_reason, "end_reason"),):
+        names = [name(code) for code in range(int(library.outcome_fields[field].hi) + 1)]
+        assert len(set(names)) == len(names)
+    phases = [library.phase_name(code) for code in range(int(library.trace_fields["phase"].hi) + 1)]
+    assert len(set(phases)) == len(phases)

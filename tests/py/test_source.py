@@ -1,0 +1,20 @@
+import numpy as np
+
+from ivl.experiment import Experiment
+from ivl.source import Plan, WorldSource
+
+
+def test_the_world_flies_a_plan_row_by_row_as_it_would_alone(small: Experiment) -> None:
+    world = small.make_world()
+    theta = np.array([[4.5, 7.0], [4.8, 8.0], [5.0, 9.0]])
+    seed, stream = np.array([1, 2, 3], dtype=np.uint64), np.array([7, 8, 9], dtype=np.uint64)
+    flown = list(WorldSource(world, small, threads=2).fly(Plan(theta, seed, stream)))
+    index = np.concatenate([portion.index for portion in flown])
+    assert sorted(index.tolist()) == [0, 1, 2]
+    for portion in flown:
+        assert portion.discarded == ""
+        for i, outcome in zip(portion.index, portion.outcomes, strict=True):
+            alone = world.rollouts(
+                small.speed_mps, small.angle_deg, *theta[i], seed=seed[i], stream=stream[i], start=small.start
+            )
+            assert outcome.tobytes() == alone.tobytes()

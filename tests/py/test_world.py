@@ -1,0 +1,180 @@
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import ivl
+from ivl.errors import ConfigError, NativeError, RolloutError
+
+APPROACH = {"speed_mps": 2.5, "angle_deg": 90.0}
+POLICY = {"rrev_c_per_s": 4.8, "moment_y_Nmm": 8.0}
+NOISE = {"sense.position_noise": 0.01, "sense.velocity_noise": 0.05, "rotor.thrust_scatter": 0.02}
+
+
+def same(a: np.ndarray, b: np.ndarray) -> bool:
+    """Equal bit for bit (NaN equals NaN)."""
+    return np.asarray(a).tobytes() == np.asarray(b).tobytes()
+
+
+def test_a_good_policy_lands_on_four_legs_without_body_contact(world: ivl.World) -> None:
+    out = world.rollouts(**APPROACH, **POLICY)
+    assert out.shape == ()
+    assert out.n_legs == 4
+    assert not out.body_contact
+    assert sorted(out.leg_order.tolist()) == [1, 2, 3, 4]
+    assert 90 < out.theta_impact_deg < 200
+
+
+def test_a_policy_that_never_triggers_in_time_has_nan_where_nothing_happened(world: ivl.World) -> None:
+    out = world.rollouts(speed_mps=2.5, angle_deg=20.0, rrev_c_per_s=20.0, moment_y_Nmm=1.0, start="imparted")
+    assert out.n_legs == 0 or np.isfinite(out.t_impact_s)
+    assert np.isnan(out.t_trigger_s) == (not out.triggered)
+
+
+def test_arguments_broadcast_to_the_shape_of_the_result(world: ivl.World) -> None:
+    out = world.rollouts(2.5, [80.0, 90.0], np.linspace(4.5, 5, 3)[:, None], 8, stream=0)
+    assert out.shape == (3, 2)
+    alone = world.rollouts(2.5, 80.0, 4.75, 8.0, stream=0)
+    assert same(out[1, 0], alone)
+
+
+def test_a_rollout_is_the_same_alone_or_in_a_batch_on_any_number_of_threads() -> None:
+    world = ivl.World("habas2021", "wide_short", "as_simulated", **NOISE)
+    rrev_c_per_s = np.linspace(3, 7, 64)
+    batch = world.rollouts(2.5, 90.0, rrev_c_per_s, 8.0, seed=3, threads=1)
+    assert same(batch, world.rollouts(2.5, 90.0, rrev_c_per_s, 8.0, seed=3, threads=2))
+    assert same(batch, world.rollouts(2.5, 90.0, rrev_c_per_s, 8.0, seed=3, threads=7))
+    for i in (0, 17, 63):
+        assert same(batch[i], world.rollouts(2.5, 90.0, rrev_c_per_s[i], 8.0, seed=3, stream=i))
+
+
+def test_batches_beyond_the_native_call_limit_keep_every_rollout_in_place(
+    world: ivl.World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = world.rollouts(2.5, 90.0, np.linspace(4, 6, 23), 8.0)
+    monkeypatch.setattr("ivl.world._BATCH_ROLLOUTS", 5)
+    assert same(whole, world.rollouts(2.5, 90.0, np.linspace(4, 6, 23), 8.0))
+
+
+def test_seed_and_stream_change_noisy_rollouts() -> None:
+    world = ivl.World("habas2021", "wide_short", "as_simulated", **NOISE)
+    first = world.rollouts(**APPROACH, **POLICY, seed=1, stream=0)
+    assert not same(first, world.rollouts(**APPROACH, **POLICY, seed=2, stream=0))
+    assert not same(first, world.rollouts(**APPROACH, **POLICY, seed=1, stream=1))
+
+
+def test_seeds_use_all_64_bits(world: ivl.World) -> None:
+    top = 2**64 - 1
+    assert not same(world.rollouts(**APPROACH, **POLICY, seed=top), world.rollouts(**APPROACH, **POLICY, seed=top - 1))
+
+
+def test_an_empty_batch_gives_an_empty_result(world: ivl.World) -> None:
+    assert world.rollouts(2.5, 90.0, np.empty((0, 3)), 8.0).shape == (0, 3)
+
+
+def test_a_pickled_world_flies_the_same_bits() -> None:
+    world = ivl.World("habas2021", "narrow_long", "table1", **{"sense.latency": 0.01})
+    copy = pickle.loads(pickle.dumps(world))
+    assert copy.overrides == {"sense.latency": 0.01}
+    assert same(world.rollouts(**APPROACH, **POLICY), copy.rollouts(**APPROACH, **POLICY))
+
+
+def test_trace_ends_in_the_outcome_of_the_same_rollout(world: ivl.World) -> None:
+    trace = world.trace(**APPROACH, **POLICY, seed=5, stream=9, period_s=0.005)
+    assert same(trace.outcome, world.rollouts(**APPROACH, **POLICY, seed=5, stream=9))
+    assert trace.rows.t_s[0] == 0
+    assert (np.diff(trace.rows.t_s) > 0).all()
+    assert trace.rows.t_s[-1] <= trace.outcome.t_end_s + 1e-9
+    assert (trace.rows.foot_state[-1] == 2).sum() == trace.outcome.n_legs
+
+
+def test_a_trace_longer_than_the_first_buffer_is_complete(world: ivl.World, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = world.trace(**APPROACH, **POLICY)
+    monkeypatch.setattr("ivl.native._TRACE_ROWS", 16)
+    assert same(whole.rows, world.trace(**APPROACH, **POLICY).rows)
+
+
+def test_at_trigger_starts_the_flip_at_the_given_distance(world: ivl.World) -> None:
+    out = world.rollouts(**APPROACH, **POLICY, start="at_trigger", d_ceil_m=[0.3, 0.5])
+    assert out.d_trigger_m == pytest.approx([0.3, 0.5], abs=0.02)
+
+
+def test_flown_start_reaches_the_approach_speed(world: ivl.World) -> None:
+    out = world.rollouts(**APPROACH, **POLICY, start="flown")
+    assert out.vz_trigger_mps == pytest.approx(2.5, abs=0.25)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"speed_mps": -1.0}, "speed_mps: value -1.0 is out of range (allowed 0.1 .. 6 m/s)"),
+        ({"speed_mps": float("nan")}, "speed_mps: value nan is out of range"),
+        ({"angle_deg": float("inf")}, "angle_deg: value inf is out of range"),
+        ({"rrev_c_per_s": [4.0, -0.1]}, "rrev_c_per_s: value -0.1 is out of range (allowed 0 .. 20 1/s)"),
+        ({"moment_y_Nmm": "8"}, "moment_y_Nmm: value '8' is not a number"),
+        ({"moment_y_Nmm": True}, "moment_y_Nmm: value True is not a number"),
+        ({"moment_y_Nmm": None}, "moment_y_Nmm: value None is not a number"),
+        ({"seed": -1}, "seed: value -1 must be a whole number"),
+        ({"seed": 1.5}, "seed: value 1.5 must be a whole number"),
+        ({"stream": [0, -2]}, "stream: value [0, -2] must be a whole number"),
+        ({"start": "thrown"}, "start: value 'thrown' is unknown (allowed imparted, flown, at_trigger)"),
+        ({"start": "at_trigger"}, "d_ceil_m: value None"),
+        ({"d_ceil_m": 0.5}, "d_ceil_m: value 0.5: start='at_trigger' needs it, others must not have it"),
+        ({"threads": 0}, "threads: value 0 is out of range"),
+        ({"threads": True}, "threads: value True is out of range"),
+        ({"speed_mps": [1.0, 2.0], "rrev_c_per_s": [1.0, 2.0, 3.0]}, "broadcast: speed_mps (2,), rrev_c_per_s (3,)"),
+    ],
+)  # fmt: skip
+def test_a_bad_argument_is_refused_with_its_range(world: ivl.World, arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(RolloutError) as caught:
+        world.rollouts(**{**APPROACH, **POLICY, **arguments})
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("period_s", [0.0, -1.0, float("nan"), 2.0])
+def test_a_bad_trace_period_is_refused(world: ivl.World, period_s: float) -> None:
+    with pytest.raises(RolloutError, match="period_s"):
+        world.trace(**APPROACH, **POLICY, period_s=period_s)
+
+
+def test_trace_refuses_arrays(world: ivl.World) -> None:
+    with pytest.raises(RolloutError, match="must be scalars"):
+        world.trace(2.5, 90.0, [4.0, 5.0], 8.0)  # type: ignore[arg-type]
+
+
+def test_an_unknown_override_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"sense\.latncy: unknown parameter, did you mean 'sense\.latency'"):
+        ivl.World(**{"sense.latncy": 0.01})
+
+
+def test_values_that_only_together_make_no_sense_are_refused_by_the_library() -> None:
+    with pytest.raises(NativeError, match="vehicle habas2021, gear table1/wide_short: "):
+        ivl.World(**{"body.inertia_xx": 1.0})
+
+
+def test_derived_values_follow_from_the_parameters(world: ivl.World) -> None:
+    derived = world.derived()
+    assert derived["mass_total_kg"] == pytest.approx(0.03584 + 4 * (4.4e-4 + 1e-5))
+    assert derived["moment_y_max_Nmm"] == pytest.approx(2000 * 0.1615 * 0.033)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    speed=st.floats(0.1, 6.0),
+    angle=st.floats(0.0, 90.0),
+    rrev=st.floats(0.0, 20.0),
+    moment=st.floats(0.0, 20.0),
+    seed=st.integers(0, 2**64 - 1),
+    start=st.sampled_from(["imparted", "flown"]),
+)
+def test_any_rollout_in_range_ends_with_a_sane_outcome(
+    world: ivl.World, speed: float, angle: float, rrev: float, moment: float, seed: int, start: str
+) -> None:
+    out = world.rollouts(speed, angle, rrev, moment, seed=seed, start=start)
+    assert 0 <= out.n_legs <= 4
+    assert (out.leg_order > 0).sum() >= out.n_legs
+    assert np.isfinite(out.d_min_m)
+    assert np.isfinite(out.t_end_s)
+    assert world.end_reason(out.end_reason) not in ("?", "not_finite", "refused")
