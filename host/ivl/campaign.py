@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 import ivl
-from ivl import assess, experiment, native, yamlfile
+from ivl import assess, experiment, links, native, yamlfile
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.learn import LearningRun, Progress, recent_rate
@@ -76,6 +76,7 @@ def run(
     resume: bool = False,
     threads: int | None = None,
     hooks: Hooks | None = None,
+    uri: str | None = None,
 ) -> RunResult:
     """Learn, judge and summarise; everything lands in `folder`.
 
@@ -86,6 +87,8 @@ def run(
         resume: Continue the run in `folder` (or re-judge it, if it is complete).
         threads: Worker threads; omitted: all processors.
         hooks: Progress.
+        uri: Where to fly (see `ivl.links`); omitted: the simulator in this process, which also judges, wherever was
+            flown.
 
     Raises:
         StoreError: The folder cannot be used, or its run is of another configuration.
@@ -94,10 +97,11 @@ def run(
     hooks = hooks or Hooks()
     world = chosen.make_world()
     manifest = make_manifest(chosen, world, n_trials)
+    source = links.open_source(uri, chosen, threads) if uri else WorldSource(world, chosen, threads)
     with _open(folder, chosen, manifest, resume) as store:
         if hooks.on_start:
             hooks.on_start(folder)
-        LearningRun(chosen, WorldSource(world, chosen, threads), store, n_trials or 1).run(hooks.on_episode)
+        LearningRun(chosen, source, store, n_trials or 1).run(hooks.on_episode)
         history, rollouts = store.episodes(), store.rollouts()
         best = _best(folder, world, chosen, threads, hooks)
         verdicts = assess.judge(world, chosen, best, history, rollouts, threads)

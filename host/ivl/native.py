@@ -109,6 +109,11 @@ class NativeLibrary:
         fields, item_size = self._fields(table)
         return {f.name: f for f in fields}, _dtype(fields, item_size)
 
+    @property
+    def c(self) -> Any:
+        """The library itself, for modules that declare further functions of it."""
+        return self._c
+
     def digest(self) -> str:
         """SHA-256 of the library file: two runs are only comparable bit for bit if it is the same."""
         return hashlib.sha256(self.path.read_bytes()).hexdigest()
@@ -147,6 +152,11 @@ class NativeModel:
         self._library = library
         self._handle = ctypes.c_void_p(handle)
         weakref.finalize(self, library._c.ivl_sil_model_free, self._handle)
+
+    @property
+    def handle(self) -> ctypes.c_void_p:
+        """The library's model, for its further functions."""
+        return self._handle
 
     def derived(self) -> npt.NDArray[np.void]:
         """Quantities that the library derives once from the parameters, one record of `derived_dtype`."""

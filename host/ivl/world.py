@@ -89,6 +89,11 @@ class World:
         extra = "".join(f", {name}={value!r}" for name, value in self.overrides.items())
         return f"World(vehicle={self.vehicle!r}, gear={self.gear!r}, gear_set={self.gear_set!r}{extra})"
 
+    @property
+    def native_model(self) -> native.NativeModel:
+        """The model inside the library."""
+        return self._native
+
     def derived(self) -> dict[str, Any]:
         """Values that the library derives once from the parameters (mass with legs, inertia, mixer ...), by name."""
         record = self._native.derived()[0]

@@ -25,6 +25,8 @@ Examples:
 
   ivl learn experiments/paper_vertical.yaml --trials 100 --json   how often and how fast, over 100 seeds
 
+  ivl learn experiments/paper_vertical.yaml --uri pil://        every tick decided by an emulated STM32
+
   ivl learn --resume --out runs/mine                            go on after Ctrl-C, kill -9 or power loss
 """
 
@@ -42,6 +44,9 @@ def learn(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default: a new one under runs/.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was cut off.")] = False,
+    uri: Annotated[
+        str | None, typer.Option(help="Where to fly: pil:// is the flight core on an emulated STM32; default: simulator.")
+    ] = None,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
 ) -> None:
@@ -50,7 +55,7 @@ def learn(
     folder = out or campaign.default_folder(chosen, n_trials, resume)
     hooks = campaign.Hooks(on_start=_announce, on_episode=console.print_episode, on_stage=_stage)
     try:
-        result = campaign.run(chosen, folder, n_trials, resume, threads, hooks)
+        result = campaign.run(chosen, folder, n_trials, resume, threads, hooks, uri)
     except KeyboardInterrupt:
         console.err.print(
             f"interrupted; continue with: ivl learn --resume --out {folder}", highlight=False, soft_wrap=True

@@ -6,6 +6,7 @@ tick is one exchange over its standard input and output. Every worker thread has
 
 import ctypes
 import os
+import shutil
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
@@ -83,8 +84,13 @@ class PilSource:
         image = Path(uri.removeprefix("pil://") or IMAGE)
         if not image.is_file():
             raise ConfigError(f"{uri}: {image} is missing: run `make firmware`")
+        command = qemu_command(image)
+        if shutil.which(command[0]) is None:
+            raise RolloutError(
+                f"{uri}: {command[0]} is not installed (Debian: qemu-system-arm; or name another in {QEMU_ENV})"
+            )
         self.world = experiment.make_world()
-        self.chips = Chips(qemu_command(image))
+        self.chips = Chips(command)
         self.chips.attach(self.world)
         self._source = WorldSource(self.world, experiment, threads)
 
