@@ -14,13 +14,15 @@ from ivl.world import Trace
 
 GEAR_SETS = ("table1", "as_simulated")
 AFTER_S = (0.02, 0.05, 0.1)  # instants after the impact at which the motion is compared
+ARGUMENTS = ("speed_mps", "angle_deg", "rrev_c_per_s", "moment_y_Nmm", "stream")
 VARIANTS = 32  # of a landing, to tell whether its outcome hangs on a hair
 VARIANT_SHARE = 1.0e-3  # by which they differ
 
 RECORD = np.dtype(
     [
-        ("set", "i4"), ("gear", "i4"), ("speed_mps", "f8"), ("angle_deg", "f8"), ("rrev_c_per_s", "f8"), ("moment_y_Nmm", "f8"),
-        ("stream", "i4"), ("n_legs", "i4"), ("n_legs_mj", "i4"), ("same_order", "?"), ("hit", "?"), ("hit_mj", "?"),
+        ("set", "i4"), ("gear", "i4"), ("speed_mps", "f8"), ("angle_deg", "f8"), ("rrev_c_per_s", "f8"),
+        ("moment_y_Nmm", "f8"), ("stream", "i4"), ("n_legs", "i4"), ("n_legs_mj", "i4"), ("same_order", "?"),
+        ("hit", "?"), ("hit_mj", "?"),
         ("plate", "?"), ("plate_mj", "?"), ("plate_first", "?"), ("dt_impact_s", "f8"), ("dtheta_impact_deg", "f8"),
         ("dp_m", "f8", len(AFTER_S)), ("da_deg", "f8", len(AFTER_S)), ("clean", "?", len(AFTER_S)),
     ]
@@ -41,8 +43,7 @@ class Landing:
 
     def arguments(self) -> dict[str, Any]:
         """For `World.trace`."""
-        names = ("speed_mps", "angle_deg", "rrev_c_per_s", "moment_y_Nmm", "stream")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in ARGUMENTS}
 
 
 def draw(n: int, seed: int) -> list[Landing]:
@@ -55,6 +56,19 @@ def draw(n: int, seed: int) -> list[Landing]:
         rrev, moment = rng.uniform(2.0, 7.0), rng.uniform(3.0, 11.0)
         result.append(Landing(*gears[i % len(gears)], speed, angle, rrev, moment, stream=i))
     return result
+
+
+def split(landings: Sequence[Landing]) -> tuple[list[Landing], list[Landing]]:
+    """Those that touch the ceiling and those that do not, in order, as the project's simulator has it."""
+    hits = np.zeros(len(landings), dtype=bool)
+    for key in {(a.gear_set, a.gear) for a in landings}:
+        chosen = [i for i, a in enumerate(landings) if (a.gear_set, a.gear) == key]
+        columns = [[getattr(landings[i], name) for i in chosen] for name in ARGUMENTS]
+        out = ivl.World("habas2021", key[1], key[0]).rollouts(*columns[:4], stream=columns[4])
+        hits[chosen] = np.isfinite(out.t_impact_s)
+    return [a for a, hit in zip(landings, hits, strict=True) if hit], [
+        a for a, hit in zip(landings, hits, strict=True) if not hit
+    ]
 
 
 def compare(

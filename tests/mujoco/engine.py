@@ -1,4 +1,4 @@
-"""Landings in MuJoCo, stepped from C (`flight.c`), with the starts and the motor commands of the project's own landings."""
+"""Landings in MuJoCo, stepped from C (`flight.c`), with starts and motor commands of the project's own landings."""
 
 import ctypes
 import hashlib
@@ -132,7 +132,7 @@ class Engine:
 
         Args:
             world: Its parameters are taken over.
-            plates: "native": MuJoCo's contact of box and plane; "same_law": Hunt-Crossley corners, written again in flight.c.
+            plates: "native": MuJoCo's contact of box and plane; "same_law": Hunt-Crossley corners, written again in C.
         """
         if plates not in ("native", "same_law"):
             raise ValueError(f"plates: value {plates!r} is unknown (allowed native, same_law)")
@@ -192,9 +192,7 @@ class Engine:
 
 def run(engine: Engine, given: Input, result: Output, rows: int | None) -> None:
     """Call `fly` of flight.c; releases the interpreter lock."""
-    status = library().fly(
-        engine.model._address, engine.data._address, ctypes.byref(given), ctypes.byref(result), rows
-    )
+    status = library().fly(engine.model._address, engine.data._address, ctypes.byref(given), ctypes.byref(result), rows)
     if status or result.failed:
         raise RuntimeError(f"MuJoCo: status {status}, bad state {result.failed}")
 
@@ -214,7 +212,7 @@ def library() -> ctypes.CDLL:
     if not target.is_file():
         BUILD.mkdir(parents=True, exist_ok=True)
         part = target.with_suffix(f".{os.getpid()}")
-        flags = "-std=c11 -O2 -Wall -Wextra -Werror -fPIC -shared".split()
+        flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"]
         command = [os.environ.get("CC", "cc"), *flags, "-isystem", str(package / "include"), str(source), str(engine)]
         subprocess.run([*command, f"-Wl,-rpath,{package}", "-lm", "-o", str(part)], check=True)
         part.rename(target)

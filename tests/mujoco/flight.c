@@ -10,11 +10,11 @@
 
 enum
 {
-    LEGS   = 4,
+    LEGS = 4,
     PLATES = 2,
-    GAPS   = LEGS + PLATES,  // feet, then plates
-    ROW    = 26,             // t, qpos[7], qvel[6], foot xyz of four legs
-    DOFS   = 6,              // of the airframe
+    GAPS = LEGS + PLATES,  // feet, then plates
+    ROW = 26,              // t, qpos[7], qvel[6], foot xyz of four legs
+    DOFS = 6,              // of the airframe
 };
 
 /// Input: a vehicle in free flight with its legs at rest, and what its motors are told.  SI units.
@@ -22,11 +22,11 @@ typedef struct
 {
     double        tick_s;
     int           n_ticks;
-    int           integrator;    // mjtIntegrator
-    int           locate;        // 1: cut a step at the instant of touch; 0: stick at the end of the step
-    int           burst;         // 1: sticking impulse in micro-steps; 0: left to the steps that follow
-    const double *command_N;     // n_ticks x 4 thrusts
-    double        scatter[4];    // factor on each thrust
+    int           integrator;      // mjtIntegrator
+    int           locate;          // 1: cut a step at the instant of touch; 0: stick at the end of the step
+    int           burst;           // 1: sticking impulse in micro-steps; 0: left to the steps that follow
+    const double *command_N;       // n_ticks x 4 thrusts
+    double        scatter[4];      // factor on each thrust
     double        speed_radps[4];  // rotor speeds at the start
     double        k_thrust_Ns2, tau_up_s, tau_down_s;
     double        ceiling_m, foot_radius_m;
@@ -60,7 +60,7 @@ typedef struct
 } flight_t;
 
 static const double FOOT_TOLERANCE_M = 1.0e-8;
-static const double MICRO_S          = 1.0e-8;
+static const double MICRO_S = 1.0e-8;
 
 /// Hunt-Crossley corners with regularised friction, in place of MuJoCo's contact.  userdata: on, height, k, damping, mu, slip speed.
 static void corners(const mjModel *m, mjData *d)
@@ -90,11 +90,11 @@ static void corners(const mjModel *m, mjData *d)
             mjtNum jacobian[3 * 64];
             mj_jac(m, d, jacobian, NULL, x, m->geom_bodyid[g]);
             mju_mulMatVec(v, jacobian, d->qvel, 3, (int)m->nv);
-            const double press  = d->userdata[2] * depth * (1.0 + d->userdata[3] * v[2]);
+            const double press = d->userdata[2] * depth * (1.0 + d->userdata[3] * v[2]);
             const double normal = (press > 0.0) ? press : 0.0;
-            const double slow   = d->userdata[5];
-            const double drag   = d->userdata[4] * normal / sqrt(v[0] * v[0] + v[1] * v[1] + slow * slow);
-            const mjtNum f[3]   = {-drag * v[0], -drag * v[1], -normal};
+            const double slow = d->userdata[5];
+            const double drag = d->userdata[4] * normal / sqrt(v[0] * v[0] + v[1] * v[1] + slow * slow);
+            const mjtNum f[3] = {-drag * v[0], -drag * v[1], -normal};
             mjtNum       q[64];
             mju_mulMatTVec(q, jacobian, f, 3, (int)m->nv);
             mju_addTo(d->qfrc_passive, q, (int)m->nv);
@@ -111,7 +111,7 @@ static void rotors(flight_t *f, double h, bool advance)
         const double tau = (gap < 0.0) ? f->in->tau_up_s : f->in->tau_down_s;
         const double e1 = -expm1(-h / tau), e2 = -expm1(-2.0 * h / tau);
         const double mean_square = c * c + 2.0 * c * gap * tau / h * e1 + gap * gap * tau / (2.0 * h) * e2;
-        f->d->ctrl[i]            = f->in->scatter[i] * f->in->k_thrust_Ns2 * mean_square;
+        f->d->ctrl[i] = f->in->scatter[i] * f->in->k_thrust_Ns2 * mean_square;
         if (advance)
         {
             f->speed[i] = c + gap * (1.0 - e1);
@@ -130,14 +130,14 @@ static void gaps(const flight_t *f, double gap[GAPS])
     {
         const mjtNum *R = d->geom_xmat + 9 * f->plate_geom[i], *s = f->m->geom_size + 3 * f->plate_geom[i];
         const double  top = d->geom_xpos[3 * f->plate_geom[i] + 2] + fabs(R[6]) * s[0] + fabs(R[7]) * s[1] + fabs(R[8]) * s[2];
-        gap[LEGS + i]     = f->out->plate_touched[i] ? 1.0 : f->in->ceiling_m - top;
+        gap[LEGS + i] = f->out->plate_touched[i] ? 1.0 : f->in->ceiling_m - top;
     }
 }
 
 /// Nose-up rotation, unwrapped: the change since the last call is less than half a turn.
 static void follow_pitch(flight_t *f)
 {
-    const mjtNum *R     = f->d->xmat + 9;
+    const mjtNum *R = f->d->xmat + 9;
     const double  angle = atan2(R[6], R[0]);
     f->theta += remainder(angle - f->theta, 2.0 * mjPI);
 }
@@ -147,7 +147,7 @@ static void set_equality(flight_t *f, double stiffness, double damping)
 {
     for (int i = 0; i < LEGS; i++)
     {
-        f->m->eq_solref[mjNREF * i]     = -stiffness;
+        f->m->eq_solref[mjNREF * i] = -stiffness;
         f->m->eq_solref[mjNREF * i + 1] = -damping;
     }
 }
@@ -185,7 +185,7 @@ static double step(flight_t *f, double h)
             {
                 // aim just beyond the surface, so that the event is on this side of the cut
                 const double s = (before[i] + 0.5 * FOOT_TOLERANCE_M) / (before[i] - after[i]);
-                share          = (s < share) ? s : share;
+                share = (s < share) ? s : share;
             }
         }
         if (!(share < 1.0))
@@ -209,7 +209,7 @@ static void note_impact(flight_t *f)
 {
     if (f->out->t_impact_s < 0.0)
     {
-        f->out->t_impact_s       = f->t_s;
+        f->out->t_impact_s = f->t_s;
         f->out->theta_impact_rad = f->theta;
         memcpy(f->out->v_impact, f->d->qvel, sizeof f->out->v_impact);
     }
@@ -218,15 +218,15 @@ static void note_impact(flight_t *f)
 /// MuJoCo's constraint solver stops the feet within a few steps of no length: an inelastic impulse.
 static void impulse(flight_t *f)
 {
-    const int integrator     = f->m->opt.integrator;
-    f->m->opt.integrator     = mjINT_EULER;
+    const int integrator = f->m->opt.integrator;
+    f->m->opt.integrator = mjINT_EULER;
     set_equality(f, 1.0, 1.0 / MICRO_S);
     for (int i = 0; i < 5; i++)
     {
         raw_step(f, MICRO_S);
     }
     f->m->opt.integrator = integrator;
-    f->nominal_s         = 0.0;  // restore the constraint's time constants
+    f->nominal_s = 0.0;  // restore the constraint's time constants
 }
 
 /// Feet and plates that arrived during the last step.
@@ -239,8 +239,8 @@ static void touches(flight_t *f)
         {
             note_impact(f);
             f->out->plate_touched[i] = 1;
-            f->out->t_plate_s[i]     = f->t_s;
-            f->t_touch_s             = f->t_s;
+            f->out->t_plate_s[i] = f->t_s;
+            f->t_touch_s = f->t_s;
         }
     }
     for (int i = 0; i < LEGS; i++)
@@ -249,12 +249,12 @@ static void touches(flight_t *f)
         {
             note_impact(f);
             memcpy(f->m->eq_data + mjNEQDATA * i + 3, f->d->site_xpos + 3 * f->foot_site[i], 3 * sizeof(mjtNum));
-            f->d->eq_active[i]                = 1;
-            f->out->order[f->out->n_stuck]     = i + 1;
+            f->d->eq_active[i] = 1;
+            f->out->order[f->out->n_stuck] = i + 1;
             f->out->t_stuck_s[f->out->n_stuck] = f->t_s;
             f->out->n_stuck++;
             f->t_touch_s = f->t_s;
-            stuck        = true;
+            stuck = true;
         }
     }
     if (stuck && f->in->burst)
@@ -307,17 +307,17 @@ static void init(flight_t *f, mjModel *m, mjData *d, const input_t *in, output_t
 {
     memset(f, 0, sizeof *f);
     memset(out, 0, sizeof *out);
-    f->m            = m;
-    f->d            = d;
-    f->in           = in;
-    f->out          = out;
+    f->m = m;
+    f->d = d;
+    f->in = in;
+    f->out = out;
     out->t_impact_s = -1.0;
     const char *const feet[LEGS] = {"foot1", "foot2", "foot3", "foot4"}, *const plates[PLATES] = {"prop_plate", "base_plate"};
     for (int i = 0; i < LEGS; i++)
     {
         f->foot_site[i] = mj_name2id(m, mjOBJ_SITE, feet[i]);
         d->eq_active[i] = 0;
-        f->speed[i]     = in->speed_radps[i];
+        f->speed[i] = in->speed_radps[i];
     }
     for (int i = 0; i < PLATES; i++)
     {
@@ -350,7 +350,7 @@ int fly(mjModel *m, mjData *d, const input_t *in, output_t *out, double *rows)
         for (int i = 0; i < 4; i++)
         {
             const double thrust = in->command_N[4 * n + i];
-            f.command[i]        = sqrt(((thrust > 0.0) ? thrust : 0.0) / in->k_thrust_Ns2);
+            f.command[i] = sqrt(((thrust > 0.0) ? thrust : 0.0) / in->k_thrust_Ns2);
         }
         tick(&f, (n + 1) * in->tick_s);
         if (rows)

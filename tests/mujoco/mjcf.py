@@ -1,8 +1,9 @@
-"""The vehicle of a `World`, written again for MuJoCo: nothing but the parameters is shared with the project's simulator.
+"""The vehicle of a `World`, written again for MuJoCo: it shares nothing but the parameters with the simulator.
 
-Body: a free joint at the centre of mass. Leg: one body with two hinges at the hip, the first about the fixed sideways axis, the second about
-an axis that the leg carries; MuJoCo composes them as the universal joint that they are. Foot: no geometry; `flight.c` switches an equality
-constraint (a point of the leg held at a point of the world) on at touch. Plates: boxes against a plane.
+Body: a free joint at the centre of mass. Leg: one body with two hinges at the hip, the first about the fixed sideways
+axis, the second about an axis that the leg carries; MuJoCo composes them as the universal joint that they are. Foot: no
+geometry; `flight.c` switches an equality constraint (a point of the leg held at a point of the world) on at touch.
+Plates: boxes against a plane.
 """
 
 import math
@@ -11,13 +12,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-# Legs and motors: 1 front-right, 2 rear-right, 3 rear-left, 4 front-left; the sign of x, of y, and of the reaction torque about body z.
+# Legs and motors 1 front-right, 2 rear-right, 3 rear-left, 4 front-left: the signs of x, of y, and of the reaction
+# torque about body z.
 SIGNS = ((1, -1, -1), (-1, -1, 1), (-1, 1, -1), (1, 1, 1))
 # The rod is thin: its moment of inertia about itself is this share of that across. MuJoCo needs a positive number.
 _THIN = 1.0e-6
-# Impedance of the plates' contact. The stiffness does not depend on it; it adds this share of the body's mass to the spring.
+# Impedance of the plates' contact. The stiffness does not depend on it; it adds this share of the body's mass.
 _PLATE_IMPEDANCE = 0.001
-# MuJoCo's damper is linear. This ratio, for a body that strikes with one corner, gives at 2 m/s the rebound of the Hunt-Crossley law (0.51).
+# MuJoCo's damper is linear. With this ratio a body that strikes with one corner at 2 m/s rebounds as under the
+# Hunt-Crossley law (restitution 0.51).
 _PLATE_DAMPING_RATIO = 0.21
 # Parameters that this model leaves out: they must have these values.
 _ABSENT = {
@@ -52,8 +55,9 @@ def build(p: Mapping[str, float]) -> str:
   <compiler angle="radian" inertiafromgeom="false"/>
   <option gravity="0 0 {-p["world.gravity"]!r}" integrator="RK4" cone="elliptic" solver="Newton" tolerance="1e-14"/>
   <size nuserdata="8"/>
+  <default><geom contype="0" conaffinity="0"/></default>
   <worldbody>
-    <geom name="ceiling" type="plane" size="0 0 1" pos="0 0 {p["world.ceiling_height"]!r}" quat="0 1 0 0" contype="0" conaffinity="0"/>
+    <geom name="ceiling" type="plane" size="0 0 1" pos="0 0 {p["world.ceiling_height"]!r}" quat="0 1 0 0"/>
     <body name="airframe">
       <freejoint/>
       <inertial pos="0 0 0" mass="{p["body.mass"]!r}"
@@ -112,7 +116,7 @@ def _leg(p: Mapping[str, float], leg: int) -> str:
 
 def _plate(p: Mapping[str, float], name: str) -> str:
     half = [0.5 * p[f"{name}.size_{axis}"] for axis in "xyz"]
-    return f'<geom name="{name}" type="box" size="{_text(half)}" pos="0 0 {p[f"{name}.center_z"]!r}" contype="0" conaffinity="0"/>'
+    return f'<geom name="{name}" type="box" size="{_text(half)}" pos="0 0 {p[f"{name}.center_z"]!r}"/>'
 
 
 def _contact(p: Mapping[str, float], name: str) -> str:
@@ -123,10 +127,10 @@ def _contact(p: Mapping[str, float], name: str) -> str:
 
 
 def plate_reference(p: Mapping[str, float], inverse_weight: float) -> tuple[float, float]:
-    """MuJoCo's direct `solref` (negative stiffness, negative damping) of a corner with the stiffness of the parameter file.
+    """MuJoCo's direct `solref` (minus stiffness, minus damping) of a corner with the stiffness of the parameters.
 
-    MuJoCo scales by its own estimate of the inverse mass and by the impedance; the inverse of that scale stands here, so that a
-    corner at rest pushes with stiffness times depth.
+    MuJoCo scales by its own estimate of the inverse mass and by the impedance; the inverse of that scale stands here,
+    so that a corner at rest pushes with stiffness times depth.
 
     Args:
         p: Parameters by dotted name.
