@@ -27,7 +27,7 @@ from ivl.world import World
 
 STUCK_SHARE = 0.5
 _STAGES = ((1.0, 8), (0.1, 64), (0.01, 400))
-"""(share of the grid points that fly, rollouts of each), added to what they flew before."""
+"""(share of the grid points that fly on, rollouts of each), added to what they flew before."""
 _FINALISTS, _FINAL_ROLLOUTS = 10, 1000
 
 FloatArray = npt.NDArray[np.float64]
@@ -89,26 +89,23 @@ def find_best(
         threads: Worker threads; omitted: all processors.
         on_stage: Called with (stage, number of stages) before each.
     """
-    theta = _grid(experiment.check.rrev_c_per_s, experiment.check.moment_y_Nmm)
+    check = experiment.check
+    theta = _grid(check.rrev_c_per_s, check.moment_y_Nmm)
     landed, flown = np.zeros(len(theta)), np.zeros(len(theta))
-    n_stages, stream = len(_STAGES) + 1, 0
-    for stage, (share, n_each) in enumerate(_STAGES):
+    chosen, stream = np.arange(len(theta)), 0
+    for stage, (share, n_full) in enumerate((*_STAGES, (0.0, _FINAL_ROLLOUTS))):
         if on_stage:
-            on_stage(stage, n_stages)
-        rate = landed / np.maximum(flown, 1)
-        chosen = np.argsort(-rate, kind="stable")[: max(_FINALISTS, int(share * len(theta)))]
-        four, _ = _rates(world, experiment, theta[chosen], n_each, stream, threads)
+            on_stage(stage, len(_STAGES) + 1)
+        n_each = max(1, round(check.effort * n_full))
+        rate = landed[chosen] / np.maximum(flown[chosen], 1)
+        chosen = chosen[np.argsort(-rate, kind="stable")[: max(_FINALISTS, int(share * len(theta)))]]
+        four, spotless = _rates(world, experiment, theta[chosen], n_each, stream, threads)
         landed[chosen] += four * n_each
         flown[chosen] += n_each
         stream += len(chosen) * n_each
-    if on_stage:
-        on_stage(n_stages - 1, n_stages)
-    finalists = theta[_most_landed(landed, flown)]
-    four, spotless = _rates(world, experiment, finalists, _FINAL_ROLLOUTS, stream, threads)
-    top = int(np.argmax(four))
-    policy = (float(finalists[top, 0]), float(finalists[top, 1]))
-    total = stream + len(finalists) * _FINAL_ROLLOUTS
-    return Best(policy, float(four[top]), float(spotless[top]), total)
+    top = int(np.argmax(four))  # of the fresh rollouts of the last stage alone
+    policy = (float(theta[chosen[top], 0]), float(theta[chosen[top], 1]))
+    return Best(policy, float(four[top]), float(spotless[top]), stream)
 
 
 def judge(
@@ -166,12 +163,6 @@ def summarise(verdicts: Sequence[Verdict]) -> dict[str, Any]:
 def _grid(rrev: GridAxis, moment: GridAxis) -> FloatArray:
     axes = [axis.lo + axis.step * np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1) for axis in (rrev, moment)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-def _most_landed(landed: FloatArray, flown: FloatArray) -> npt.NDArray[np.intp]:
-    """The finalists: best rate among the points that reached the last stage."""
-    rate = np.where(flown == flown.max(), landed / np.maximum(flown, 1), -1.0)
-    return np.argsort(-rate, kind="stable")[:_FINALISTS]
 
 
 def _rates(

@@ -23,7 +23,7 @@ from ivl.experiment import Experiment
 from ivl.learn import LearningRun, Progress, recent_rate
 from ivl.outcome import four_leg
 from ivl.source import WorldSource
-from ivl.store import SCHEMA_VERSION, SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest, write_json
+from ivl.store import DISCARDED, SCHEMA_VERSION, SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest, write_json
 from ivl.world import World
 
 _MUST_MATCH = ("trials", "config_sha256", "model_sha256", "library_sha256")
@@ -105,8 +105,14 @@ def run(
         history, rollouts = store.episodes(), store.rollouts()
         best = _best(folder, world, chosen, threads, hooks)
         verdicts = assess.judge(world, chosen, best, history, rollouts, threads)
-        summary = _summary_of_trials(verdicts) if n_trials else _summary_of_one(verdicts[0], history, rollouts)
-        summary |= {"run_dir": str(folder), "learner": chosen.learner.name, "best": asdict(best)}
+        summary = assess.summarise(verdicts) if n_trials else _summary_of_one(verdicts[0], history, rollouts)
+        n_discarded = int((rollouts.status == DISCARDED).sum())
+        summary |= {
+            "run_dir": str(folder),
+            "learner": chosen.learner.name,
+            "best": asdict(best),
+            "discarded": n_discarded,
+        }
         write_json(folder / "result.json", {**summary, "verdicts": [asdict(v) for v in verdicts]})
     return RunResult(folder, chosen, world, best, verdicts, history, rollouts, summary)
 
@@ -216,10 +222,6 @@ def _summary_of_one(verdict: assess.Verdict, history: list[EpisodeRow], rollouts
         "rollouts": int((rollouts.status == SCORED).sum()),
         "four_leg_landings": int((four_leg(rollouts.outcomes) & (rollouts.status == SCORED)).sum()),
     }
-
-
-def _summary_of_trials(verdicts: list[assess.Verdict]) -> dict[str, Any]:
-    return assess.summarise(verdicts)
 
 
 def _json_number(value: float) -> float | None:

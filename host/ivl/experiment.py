@@ -93,6 +93,7 @@ class Check(_Strict):
     n_fresh: int = Field(default=200, ge=1, le=100_000, description="rollouts that judge one recommended policy")
     share_of_best: Finite = Field(default=0.9, gt=0, le=1, description="share of the best possible rate that solves")
     rrev_c_per_s: GridAxis = GridAxis(lo=0.5, hi=10.0, step=0.05)
+    effort: Finite = Field(default=1.0, gt=0, le=100, description="factor on the rollouts of the search for the best")
     moment_y_Nmm: GridAxis = GridAxis(lo=1.0, hi=11.0, step=0.5)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl.experiment import Experiment
-from ivl.outcome import Outcomes
+from ivl.outcome import Outcomes, valid
 from ivl.world import World
 
 
@@ -62,7 +62,7 @@ class WorldSource:
         self.world, self._experiment, self._threads = world, experiment, threads
 
     def fly(self, plan: Plan) -> Iterator[Flown]:
-        """Fly the plan; one portion with everything."""
+        """Fly the plan; one portion with everything, and one with what the simulation could not bring to an end."""
         experiment = self._experiment
         outcomes = self.world.rollouts(
             experiment.speed_mps,
@@ -74,4 +74,8 @@ class WorldSource:
             start=experiment.start,
             threads=self._threads,
         )
-        yield Flown(np.arange(len(plan.theta)), outcomes)
+        good = valid(outcomes)
+        yield Flown(np.flatnonzero(good), outcomes[good])
+        if not good.all():
+            reasons = sorted({self.world.end_reason(code) for code in outcomes.end_reason[~good]})
+            yield Flown(np.flatnonzero(~good), outcomes[~good], f"simulation: {', '.join(reasons)}")

@@ -17,6 +17,15 @@ def test_three_legs_count_as_a_four_leg_landing() -> None:
     assert outcome.four_leg(outcomes([0, 1, 2, 3, 4], [0] * 5)).tolist() == [False, False, False, True, True]
 
 
+def test_a_rollout_whose_simulation_broke_down_is_no_landing() -> None:
+    records = outcomes([4, 4], [0, 0])
+    codes = [code for code in range(20) if native.library().end_reason(code) == "not_finite"]
+    records["end_reason"][1] = codes[0]
+    assert outcome.valid(records).tolist() == [True, False]
+    assert outcome.four_leg(records).tolist() == [True, False]
+    assert outcome.clean(records).tolist() == [True, False]
+
+
 def test_clean_needs_four_legs_and_no_body_contact() -> None:
     assert outcome.clean(outcomes([4, 4, 3, 2], [0, 1, 0, 0])).tolist() == [True, False, True, False]
 

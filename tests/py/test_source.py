@@ -1,5 +1,8 @@
 import numpy as np
+import pytest
 
+import ivl
+from ivl import native
 from ivl.experiment import Experiment
 from ivl.source import Plan, WorldSource
 
@@ -18,3 +21,22 @@ def test_the_world_flies_a_plan_row_by_row_as_it_would_alone(small: Experiment) 
                 small.speed_mps, small.angle_deg, *theta[i], seed=seed[i], stream=stream[i], start=small.start
             )
             assert outcome.tobytes() == alone.tobytes()
+
+
+def test_a_rollout_that_the_simulation_could_not_finish_is_discarded_with_the_reason(
+    small: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = small.make_world()
+    not_finite = next(code for code in range(20) if native.library().end_reason(code) == "not_finite")
+    original = ivl.World.rollouts
+
+    def broken(self: ivl.World, *args: object, **kw: object) -> np.recarray:
+        outcomes = original(self, *args, **kw)  # type: ignore[arg-type]
+        outcomes.end_reason[1] = not_finite
+        return outcomes
+
+    monkeypatch.setattr(ivl.World, "rollouts", broken)
+    plan = Plan(np.full((3, 2), (4.8, 8.0)), np.zeros(3, dtype=np.uint64), np.arange(3, dtype=np.uint64))
+    scored, discarded = WorldSource(world, small).fly(plan)
+    assert (scored.index.tolist(), scored.discarded) == ([0, 2], "")
+    assert (discarded.index.tolist(), discarded.discarded) == ([1], "simulation: not_finite")

@@ -45,7 +45,8 @@ def learn(
     out: Annotated[Path | None, typer.Option(help="Run folder; default: a new one under runs/.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was cut off.")] = False,
     uri: Annotated[
-        str | None, typer.Option(help="Where to fly: pil:// is the flight core on an emulated STM32; default: simulator.")
+        str | None,
+        typer.Option(help="Where to fly: pil:// is the flight core on an emulated STM32; default: simulator."),
     ] = None,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
@@ -108,6 +109,8 @@ def _report(result: campaign.RunResult, pictures: list[Path]) -> None:
         f"{console.percent(best.rate_four_leg)} at RREV_c {best.theta[0]:.2f} 1/s, M_yd {best.theta[1]:.2f} N mm"
     )
     lines.append(("best possible policy (grid)", best_text))
+    if summary["discarded"]:
+        lines.append(("discarded rollouts (not learned from)", str(summary["discarded"])))
     lines.append(("run folder", str(result.folder)))
     lines.extend(("picture", str(picture)) for picture in pictures)
     for name, text in lines:

@@ -1,0 +1,142 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ivl import campaign, native
+from ivl.errors import StoreError
+from ivl.experiment import Experiment
+from ivl.store import RunStore
+
+
+def test_a_run_leaves_config_manifest_rollouts_and_result(small: Experiment, tmp_path: Path) -> None:
+    result = campaign.run(small, tmp_path / "run")
+    assert campaign.read_config(tmp_path / "run") == (small, None)
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    assert manifest["parameters"]["body.mass"] == {"value": 0.03584, "from": "habas2021.yaml"}
+    assert manifest["units"]["out_t_impact_s"] == "s"
+    saved = json.loads((tmp_path / "run" / "result.json").read_text())
+    assert {key: saved[key] for key in result.summary} == json.loads(json.dumps(result.summary))
+    assert saved["verdicts"][0]["trial"] == 0
+    assert len(result.rollouts) == small.budget
+
+
+def test_the_summary_of_one_run_has_the_keys_that_scripts_rely_on(small: Experiment, tmp_path: Path) -> None:
+    summary = campaign.run(small, tmp_path / "run").summary
+    assert list(summary)[:7] == [
+        "solved", "rollouts_to_convergence", "mu", "sigma",
+        "landing_rate_four_leg", "landing_rate_clean", "failed_landings",
+    ]  # fmt: skip
+    assert summary["run_dir"] == str(tmp_path / "run")
+    assert isinstance(summary["solved"], bool)
+
+
+def test_the_summary_agrees_with_what_was_flown(small: Experiment, tmp_path: Path) -> None:
+    result = campaign.run(small, tmp_path / "run")
+    n_legs = result.rollouts.outcomes["n_legs"]
+    assert result.summary["landing_rate_four_leg"] == pytest.approx((n_legs[-12:] >= 3).mean())
+    assert result.summary["failed_landings_total"] == (n_legs < 3).sum()
+    assert result.summary["mu"] == list(result.history[-1].mu)
+
+
+def test_trials_are_summarised_together(small: Experiment, tmp_path: Path) -> None:
+    result = campaign.run(small, tmp_path / "run", n_trials=3)
+    assert result.summary["trials"] == 3
+    assert [v.trial for v in result.verdicts] == [0, 1, 2]
+    assert len(result.rollouts) == 3 * small.budget
+
+
+def test_hooks_are_called_on_the_way(small: Experiment, tmp_path: Path) -> None:
+    calls: list[str] = []
+    hooks = campaign.Hooks(
+        on_start=lambda folder: calls.append(folder.name),
+        on_episode=lambda progress: calls.append(f"episode {progress.episode}"),
+        on_stage=lambda stage, n: calls.append(f"stage {stage} of {n}"),
+    )
+    campaign.run(small, tmp_path / "run", hooks=hooks)
+    assert calls == ["run"] + [f"episode {k}" for k in (1, 2, 3, 4)] + [f"stage {k} of 4" for k in range(4)]
+
+
+def test_resuming_a_finished_run_gives_the_same_result_and_flies_no_grid(small: Experiment, tmp_path: Path) -> None:
+    first = campaign.run(small, tmp_path / "run")
+    stages: list[int] = []
+    hooks = campaign.Hooks(on_stage=lambda stage, _: stages.append(stage))
+    again = campaign.run(small, tmp_path / "run", resume=True, hooks=hooks)
+    assert again.summary == first.summary
+    assert stages == []
+
+
+def test_an_interrupted_run_resumes_to_the_same_result(small: Experiment, tmp_path: Path) -> None:
+    def interrupt(progress: object) -> None:
+        if getattr(progress, "episode") == 2:  # noqa: B009
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        campaign.run(small, tmp_path / "cut", hooks=campaign.Hooks(on_episode=interrupt))
+    resumed = campaign.run(small, tmp_path / "cut", resume=True)
+    whole = campaign.run(small, tmp_path / "whole")
+    assert resumed.rollouts.outcomes.tobytes() == whole.rollouts.outcomes.tobytes()
+    assert {**resumed.summary, "run_dir": ""} == {**whole.summary, "run_dir": ""}
+
+
+@pytest.mark.parametrize(
+    ("change", "n_trials", "message"),
+    [
+        ({"seed": 1}, None, "cannot be resumed: seed: it has 0, now 1"),
+        ({"budget": 20}, None, "cannot be resumed: budget: it has 16, now 20"),
+        ({}, 2, "cannot be resumed: trials: it has None, now 2"),
+    ],
+)
+def test_a_run_of_another_configuration_is_not_resumed(
+    small: Experiment, tmp_path: Path, change: dict[str, int], n_trials: int | None, message: str
+) -> None:
+    campaign.run(small, tmp_path / "run")
+    with pytest.raises(StoreError, match=message):
+        campaign.run(small.model_copy(update=change), tmp_path / "run", n_trials, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [("library_sha256", "native library changed"), ("model_sha256", "vehicle or gear files changed")],
+)
+def test_a_run_whose_world_changed_is_not_resumed(small: Experiment, tmp_path: Path, key: str, message: str) -> None:
+    campaign.run(small, tmp_path / "run")
+    path = tmp_path / "run" / "manifest.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), key: "other"}))
+    with pytest.raises(StoreError, match=message):
+        campaign.run(small, tmp_path / "run", resume=True)
+
+
+def test_a_run_is_not_overwritten(small: Experiment, tmp_path: Path) -> None:
+    campaign.run(small, tmp_path / "run")
+    with pytest.raises(StoreError, match="holds a run already"):
+        campaign.run(small, tmp_path / "run")
+
+
+def test_resuming_where_nothing_is_says_so(small: Experiment, tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="there is no run to resume"):
+        campaign.run(small, tmp_path / "none", resume=True)
+
+
+def test_default_folders_are_numbered_and_the_newest_is_resumed(
+    small: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(StoreError, match="there is no run to resume; name its folder with --out"):
+        campaign.default_folder(small, None, resume=True)
+    first = campaign.default_folder(small, None, resume=False)
+    assert first == Path("runs/small-ephe_robust-seed0")
+    first.mkdir(parents=True)
+    second = campaign.default_folder(small, None, resume=False)
+    assert second == Path("runs/small-ephe_robust-seed0-2")
+    second.mkdir()
+    assert campaign.default_folder(small, None, resume=True) == second
+    assert campaign.default_folder(small, 100, resume=False) == Path("runs/small-ephe_robust-seed0-x100")
+
+
+def test_a_run_can_be_read_with_sqlite_alone(small: Experiment, tmp_path: Path) -> None:
+    result = campaign.run(small, tmp_path / "run")
+    with RunStore.open_existing(tmp_path / "run", native.library().outcome_dtype) as store:
+        query = "SELECT count(*), avg(out_n_legs) FROM rollout WHERE status = 'scored'"
+        assert store._db.execute(query).fetchone() == (16, np.mean(result.rollouts.outcomes["n_legs"]))

@@ -1,0 +1,71 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ivl
+from ivl import campaign
+from ivl.errors import ConfigError
+from ivl.experiment import Experiment
+from ivl.plots import convergence, strobe, style
+
+
+@pytest.fixture
+def result(small: Experiment, tmp_path: Path) -> campaign.RunResult:
+    return campaign.run(small, tmp_path / "run")
+
+
+def is_picture(path: Path) -> bool:
+    head = path.read_bytes()[:300]
+    return {".png": head.startswith(b"\x89PNG"), ".svg": b"<svg" in head, ".pdf": head.startswith(b"%PDF")}[path.suffix]
+
+
+def test_convergence_and_last_landing_are_drawn_into_the_run_folder(result: campaign.RunResult) -> None:
+    files = [*convergence.draw_run(result), *strobe.draw_last_landing(result)]
+    names = ["convergence.png", "convergence.svg", "last_landing.png", "last_landing.svg"]
+    assert [file.name for file in files] == names
+    assert all(file.parent == result.folder and is_picture(file) for file in files)
+
+
+def test_every_scored_rollout_has_exactly_one_colour(result: campaign.RunResult) -> None:
+    masks = np.array(convergence.outcome_classes(result.rollouts))
+    assert (masks.sum(axis=0) == (result.rollouts.status == "scored")).all()
+
+
+def test_equal_runs_give_equal_svg_files(result: campaign.RunResult, tmp_path: Path) -> None:
+    files = [
+        convergence.draw(result.experiment, result.history, result.rollouts, [tmp_path / f"{k}.svg"]) for k in "ab"
+    ]
+    assert files[0][0].read_bytes() == files[1][0].read_bytes()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"rrev_c_per_s": 4.8, "moment_y_Nmm": 8.0},
+        {"rrev_c_per_s": 20.0, "moment_y_Nmm": 1.0},
+        {"rrev_c_per_s": 0.0, "moment_y_Nmm": 10.0},
+        {"rrev_c_per_s": 4.8, "moment_y_Nmm": 8.0, "start": "flown"},
+        {"rrev_c_per_s": 4.8, "moment_y_Nmm": 8.0, "start": "at_trigger", "d_ceil_m": 0.5},
+    ],
+)
+def test_a_landing_or_a_miss_can_be_drawn(world: ivl.World, arguments: dict[str, float], tmp_path: Path) -> None:
+    trace = world.trace(2.5, 60.0, **arguments)  # type: ignore[arg-type]
+    (file,) = strobe.draw(world, trace, [tmp_path / "landing.pdf"])
+    assert is_picture(file)
+
+
+def test_the_drawn_legs_have_the_length_of_the_legs(world: ivl.World) -> None:
+    trace = world.trace(2.5, 90.0, 4.8, 8.0)
+    row = trace.rows[len(trace.rows) // 2]
+    values = world.params.values
+    hips_B = np.column_stack([values["leg.hip_xy"] * strobe._LEG_SIGNS, np.full(4, values["leg.hip_z"])])
+    hips_W = row.p_WB_m + hips_B @ strobe._rotation(row.q_WB).T
+    lengths_m = np.linalg.norm(row.foot_W_m.reshape(4, 3) - hips_W, axis=1)
+    assert lengths_m == pytest.approx(np.full(4, values["leg.length"]), abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["missing/x.png", "x.unknown"])
+def test_a_figure_that_cannot_be_written_is_named(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ConfigError, match="the figure cannot be written"):
+        style.save(style.new_figure(1, 1), [tmp_path / name])
