@@ -23,6 +23,19 @@ static const char *bad_range(const ivl_cfg_t *cfg)
     return NULL;
 }
 
+static const char *bad_fence(const ivl_cfg_t *cfg)
+{
+    if (!(cfg->fence_x_m_min < cfg->fence_x_m_max))
+    {
+        return "fence_x_min";
+    }
+    if (!(cfg->fence_y_m_min < cfg->fence_y_m_max))
+    {
+        return "fence_y_min";
+    }
+    return (cfg->fence_z_m_min < cfg->fence_z_m_max) ? NULL : "fence_z_min";
+}
+
 const char *ivl_cfg_bad_name(const ivl_cfg_t *cfg)
 {
     const char *bad = bad_range(cfg);
@@ -42,6 +55,11 @@ const char *ivl_cfg_bad_name(const ivl_cfg_t *cfg)
     if (!(4.0f * cfg->motor_thrust_N_max > cfg->mass_kg * cfg->gravity_mps2))
     {
         return "motor_thrust_max";
+    }
+    const char *fence = bad_fence(cfg);
+    if (fence != NULL)
+    {
+        return fence;
     }
     return ivl_pwm_curve_good(cfg) ? NULL : "pwm_c";
 }

@@ -1,8 +1,10 @@
 /// @file ivl_phase.c
-/// The phase table and its conditions.  Read the table first.
+/// The phase table and its conditions.  Read the table first.  What must not happen stands in the table of ivl_guard.c.
 #include "ivl_phase.h"
 
 #include <string.h>
+
+#include "ivl_guard.h"
 
 // ---- conditions: pure questions about the state of this tick
 
@@ -27,13 +29,10 @@ static bool fresh(const ivl_state_t *state)
     return state->sense.pose_fresh && state->sense.cmd_fresh;
 }
 
-// a good, recent sample of a vehicle that is not tipped over
-static bool flyable(const ivl_state_t *state)
+static bool rule_says(const ivl_state_t *state, ivl_act_t act)
 {
-    return state->sense.pose_usable && (state->sense.up_z >= state->derived.cos_tilt_abort);
+    return ivl_guard_act((ivl_rule_t)state->guard.rule) == act;
 }
-
-static bool trigger_fires(const ivl_state_t *state, ivl_cues_t cues);
 
 CONDITION(request_idle)
 {
@@ -53,12 +52,11 @@ CONDITION(request_hover)
     return requested(state, IVL_REQUEST_HOVER);
 }
 
-// after a landing only HOVER starts the next cycle: a forgotten APPROACH must not
 CONDITION(may_arm)
 {
     UNUSED(cfg), UNUSED(cues);
-    const bool wanted = requested(state, IVL_REQUEST_HOVER) || (requested(state, IVL_REQUEST_APPROACH) && !state->triggered);
-    return wanted && state->derived.cfg_good && fresh(state) && flyable(state);
+    const bool wanted = requested(state, IVL_REQUEST_HOVER) || requested(state, IVL_REQUEST_APPROACH);
+    return wanted && state->derived.cfg_good && fresh(state) && rule_says(state, IVL_ACT_NONE);
 }
 
 CONDITION(may_approach)
@@ -67,58 +65,38 @@ CONDITION(may_approach)
     return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && fresh(state) && elapsed(state, cfg->ready_s_min);
 }
 
-CONDITION(unfit)
+// ---- conditions: what the rules say
+
+CONDITION(must_abort)
 {
     UNUSED(cfg), UNUSED(cues);
-    return !(flyable(state) && state->sense.cmd_usable);
+    return rule_says(state, IVL_ACT_ABORT);
 }
+
+CONDITION(must_attach)
+{
+    UNUSED(cfg), UNUSED(cues);
+    return rule_says(state, IVL_ACT_ATTACH);
+}
+
+CONDITION(must_cut)
+{
+    UNUSED(cfg), UNUSED(cues);
+    return rule_says(state, IVL_ACT_CUT);
+}
+
+// ---- conditions: the landing
 
 CONDITION(triggered)
 {
     UNUSED(cfg);
-    return trigger_fires(state, cues);
-}
-
-CONDITION(approach_too_long)
-{
-    UNUSED(cues);
-    return elapsed(state, cfg->approach_s_max);
-}
-
-CONDITION(contact)
-{
-    UNUSED(cues);
-    return (cfg->cut_on_contact != 0u) && state->contact.contact;
-}
-
-CONDITION(hanging)
-{
-    UNUSED(cfg), UNUSED(cues);
-    return state->contact.hanging;
-}
-
-CONDITION(inputs_lost)
-{
-    UNUSED(cfg), UNUSED(cues);
-    return !(state->sense.pose_usable && state->sense.cmd_usable);
+    return !rule_says(state, IVL_ACT_HOLD) && ivl_trigger_due(&state->policy, cues);
 }
 
 CONDITION(inverted)
 {
     UNUSED(cues);
     return (cfg->cut_at_inverted != 0u) && !(state->sense.up_z > 0.0f);
-}
-
-CONDITION(flip_too_long)
-{
-    UNUSED(cues);
-    return elapsed(state, cfg->flip_s_max);
-}
-
-CONDITION(coast_over)
-{
-    UNUSED(cues);
-    return elapsed(state, cfg->coast_s_max);
 }
 
 CONDITION(attached_over)
@@ -129,7 +107,7 @@ CONDITION(attached_over)
 
 // ---- the table
 
-#define EXITS_MAX 6
+#define EXITS_MAX 5
 
 typedef struct
 {
@@ -141,44 +119,40 @@ typedef struct
 {
     const char *name;
     ivl_drive_t drive;
-    bool        trigger_live;
     exit_t      exits[EXITS_MAX + 1];  // the first one whose condition holds is taken
 } row_t;
 
+// A request to abort does nothing once the trigger has fired: half a flip is worse than a whole one.  IDLE is the kill switch of every phase.
 // clang-format off
 static const row_t ROWS[] = {
-    [IVL_PHASE_IDLE] = {"idle", IVL_DRIVE_OFF, false,
+    [IVL_PHASE_IDLE] = {"idle", IVL_DRIVE_OFF,
         {{may_arm,           IVL_PHASE_READY}}},
-    [IVL_PHASE_READY] = {"ready", IVL_DRIVE_HOVER, false,
+    [IVL_PHASE_READY] = {"ready", IVL_DRIVE_HOVER,
         {{request_idle,      IVL_PHASE_IDLE},
          {request_abort,     IVL_PHASE_ABORTED},
-         {unfit,             IVL_PHASE_ABORTED},
+         {must_abort,        IVL_PHASE_ABORTED},
          {may_approach,      IVL_PHASE_APPROACH}}},
-    [IVL_PHASE_APPROACH] = {"approach", IVL_DRIVE_APPROACH, true,
+    [IVL_PHASE_APPROACH] = {"approach", IVL_DRIVE_APPROACH,
         {{request_idle,      IVL_PHASE_IDLE},
          {request_abort,     IVL_PHASE_ABORTED},
-         {unfit,             IVL_PHASE_ABORTED},
+         {must_abort,        IVL_PHASE_ABORTED},
          {request_hover,     IVL_PHASE_READY},
-         {triggered,         IVL_PHASE_FLIP},
-         {approach_too_long, IVL_PHASE_ABORTED}}},
-    [IVL_PHASE_FLIP] = {"flip", IVL_DRIVE_FLIP, false,
+         {triggered,         IVL_PHASE_FLIP}}},
+    [IVL_PHASE_FLIP] = {"flip", IVL_DRIVE_FLIP,
         {{request_idle,      IVL_PHASE_IDLE},
-         {contact,           IVL_PHASE_ATTACHED},
-         {request_abort,     IVL_PHASE_COAST},
-         {inputs_lost,       IVL_PHASE_COAST},
-         {inverted,          IVL_PHASE_COAST},
-         {flip_too_long,     IVL_PHASE_COAST}}},
-    [IVL_PHASE_COAST] = {"coast", IVL_DRIVE_OFF, false,
+         {must_attach,       IVL_PHASE_ATTACHED},
+         {must_cut,          IVL_PHASE_COAST},
+         {inverted,          IVL_PHASE_COAST}}},
+    [IVL_PHASE_COAST] = {"coast", IVL_DRIVE_OFF,
         {{request_idle,      IVL_PHASE_IDLE},
-         {contact,           IVL_PHASE_ATTACHED},
-         {hanging,           IVL_PHASE_ATTACHED},
-         {coast_over,        IVL_PHASE_DONE}}},
-    [IVL_PHASE_ATTACHED] = {"attached", IVL_DRIVE_OFF, false,
+         {must_attach,       IVL_PHASE_ATTACHED},
+         {must_cut,          IVL_PHASE_DONE}}},
+    [IVL_PHASE_ATTACHED] = {"attached", IVL_DRIVE_OFF,
         {{request_idle,      IVL_PHASE_IDLE},
          {attached_over,     IVL_PHASE_DONE}}},
-    [IVL_PHASE_DONE] = {"done", IVL_DRIVE_OFF, false,
+    [IVL_PHASE_DONE] = {"done", IVL_DRIVE_OFF,
         {{request_idle,      IVL_PHASE_IDLE}}},
-    [IVL_PHASE_ABORTED] = {"aborted", IVL_DRIVE_HOVER, false,
+    [IVL_PHASE_ABORTED] = {"aborted", IVL_DRIVE_LAND,
         {{request_idle,      IVL_PHASE_IDLE}}},
 };
 // clang-format on
@@ -188,17 +162,12 @@ _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_PHASE_COUNT, "one row
 _Static_assert(IVL_PHASE_IDLE == 0 && IVL_PHASE_READY == 1 && IVL_PHASE_APPROACH == 2 && IVL_PHASE_FLIP == 3, "phase numbers");
 _Static_assert(IVL_PHASE_COAST == 4 && IVL_PHASE_ATTACHED == 5 && IVL_PHASE_DONE == 6 && IVL_PHASE_ABORTED == 7, "phase numbers");
 
-static bool trigger_fires(const ivl_state_t *state, ivl_cues_t cues)
-{
-    return ROWS[state->phase].trigger_live && state->has_policy && !state->triggered && fresh(state) &&
-           ivl_trigger_due(&state->policy, cues);
-}
-
 // ---- what happens on the way into a phase
 
 static void enter_ready(ivl_state_t *state)
 {
     state->triggered = false;
+    state->guard.cause = IVL_RULE_NONE;
     memset(&state->snapshot, 0, sizeof state->snapshot);
 }
 
@@ -224,6 +193,7 @@ static void enter(ivl_state_t *state, ivl_phase_t next, ivl_ceiling_t ceiling, i
     case IVL_PHASE_ABORTED:
         state->p_hold_W_m = sample->p_WB_m;
         state->abort_cut = false;
+        state->landed_s = 0.0f;
         state->diag.n_abort++;
         break;
     case IVL_PHASE_IDLE:
@@ -236,12 +206,25 @@ static void enter(ivl_state_t *state, ivl_phase_t next, ivl_ceiling_t ceiling, i
     }
 }
 
+static void note_cause(ivl_state_t *state)
+{
+    if (rule_says(state, IVL_ACT_ABORT) || rule_says(state, IVL_ACT_ATTACH) || rule_says(state, IVL_ACT_CUT))
+    {
+        state->guard.cause = state->guard.rule;
+    }
+}
+
 static bool take_exit(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues)
 {
+    state->guard.rule = (uint8_t)ivl_guard_find(cfg, state, ceiling, cues);
     for (const exit_t *e = ROWS[state->phase].exits; e->when != NULL; e++)
     {
         if (e->when(cfg, state, cues))
         {
+            if (state->phase != IVL_PHASE_IDLE)
+            {
+                note_cause(state);
+            }
             enter(state, e->next, ceiling, cues);
             return true;
         }
@@ -261,11 +244,12 @@ void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ce
     {
         state->p_hold_W_m = state->sense.cmd.p_hover_W_m;
     }
-    // a vehicle that was lost once may lie anywhere when it is seen again: its motors stay off
-    if ((state->phase == IVL_PHASE_ABORTED) && !flyable(state))
+    // a vehicle that was lost once may lie anywhere when it is seen again, one that has landed is to stay: motors off
+    if ((state->phase == IVL_PHASE_ABORTED) && !state->abort_cut && rule_says(state, IVL_ACT_CUT))
     {
         state->abort_cut = true;
     }
+    ivl_guard_lock_out(cfg, state);
 }
 
 ivl_drive_t ivl_phase_drive(const ivl_state_t *state)

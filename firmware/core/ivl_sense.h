@@ -11,7 +11,7 @@
 #define IVL_SENSE_F_MPS2_MAX  1.0e6f   ///< m/s^2, each component; high, since an impact is a spike
 #define IVL_SENSE_Q_NORM2_TOL 0.05f    ///< |q|^2 may differ from 1 by this much; it is normalised
 
-/// The input of one tick: now, one sensed state, one command.
+/// The input of one tick: now, one sensed state, one command, and how the vehicle is.
 typedef struct
 {
     uint64_t      t_us;       ///< now; must advance from tick to tick
@@ -22,6 +22,7 @@ typedef struct
     ivl_vec3_t    w_B_radps;
     ivl_vec3_t    f_B_mps2;  ///< specific force (accelerometer)
     ivl_command_t cmd;
+    ivl_vitals_t  vitals;
 } ivl_in_t;
 
 typedef struct

@@ -17,6 +17,16 @@ typedef struct
     uint32_t n_trigger;         ///< triggers fired
 } ivl_diag_t;
 
+/// What the safety rules remember.
+typedef struct
+{
+    ivl_vitals_t vitals;      ///< this tick's
+    uint8_t      rule;        ///< ivl_rule_t that holds in the present phase, 0 if none
+    uint8_t      cause;       ///< ivl_rule_t that last ended a phase of this arm cycle, 0 if none did
+    bool         locked_out;  ///< the vehicle may hang or lie anywhere: no other controller gets the motors
+    float        rest_s;      ///< how long it has rested upright since
+} ivl_guard_t;
+
 /// Values that follow from the configuration, made once by ivl_init.
 typedef struct
 {
@@ -32,12 +42,14 @@ typedef struct
     uint32_t       n_phase_tick;  ///< ticks spent in this phase
     bool           has_policy;    ///< a policy was committed
     bool           triggered;     ///< the trigger has fired in this arm cycle
-    bool           abort_cut;     ///< ABORTED has lost the sensed state: motors stay off
+    bool           abort_cut;     ///< ABORTED has lost the sensed state or has landed: motors stay off
     ivl_derived_t  derived;
     ivl_sense_t    sense;
     ivl_policy_t   policy;
     ivl_approach_t approach;
     ivl_vec3_t     p_hold_W_m;  ///< where READY and ABORTED hover
+    float          landed_s;    ///< ABORTED: how long the reference has been at land_height
+    ivl_guard_t    guard;
     ivl_contact_t  contact;
     ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
     ivl_diag_t     diag;

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "ivl.h"
+#include "ivl_landing.h"
 #include "ivl_maneuver.h"
 
 void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state)
@@ -30,7 +31,13 @@ static void count_faults(ivl_diag_t *diag, const ivl_sense_t *sense)
 // all motors off
 static void rest(const ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues, ivl_out_t *out)
 {
-    *out = (ivl_out_t){.phase = state->phase, .phase_log = (uint8_t)state->phase, .ceiling = ceiling, .cues = cues};
+    *out = (ivl_out_t){
+        .phase = state->phase,
+        .phase_log = (uint8_t)state->phase,
+        .stock_allowed = (state->phase == IVL_PHASE_IDLE) && !state->guard.locked_out,
+        .ceiling = ceiling,
+        .cues = cues,
+    };
 }
 
 static void track(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_reference_t *ref, float thrust_N[4])
@@ -46,6 +53,10 @@ static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, fl
     {
     case IVL_DRIVE_HOVER:
         ref.p_W_m = state->p_hold_W_m;
+        track(cfg, state, &ref, thrust_N);
+        break;
+    case IVL_DRIVE_LAND:
+        ref = ivl_landing_next(cfg, state);
         track(cfg, state, &ref, thrust_N);
         break;
     case IVL_DRIVE_APPROACH:
@@ -75,6 +86,7 @@ void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_
         return;
     }
 
+    state->guard.vitals = in->vitals;
     // sensed state -> contact, ceiling -> cues -> phase (the trigger is one of its conditions)
     ivl_sense_update(cfg, &state->sense, in, state->derived.dt_s);
     count_faults(&state->diag, &state->sense);

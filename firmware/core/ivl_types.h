@@ -35,7 +35,7 @@ typedef enum
     IVL_PHASE_COAST,     ///< motors off, body rotates freely
     IVL_PHASE_ATTACHED,  ///< motors off, contact or hanging was sensed
     IVL_PHASE_DONE,      ///< motors off until the next request cycle
-    IVL_PHASE_ABORTED,   ///< level hover at the abort point while the sensed state is good, else motors off for good
+    IVL_PHASE_ABORTED,   ///< level hover at the abort point, then landing, while the sensed state is good; else motors off for good
     IVL_PHASE_COUNT
 } ivl_phase_t;
 
@@ -65,6 +65,57 @@ typedef struct
     float         speed_mps;    ///< used by APPROACH, latched when the approach starts
     float         angle_rad;    ///< used by APPROACH: angle above horizontal, 0..pi/2; motion in the x-z plane of W, along +x
 } ivl_command_t;
+
+/// Safety rules; the numbers are part of the log format.  What each one says stands in the table of ivl_guard.c.
+typedef enum
+{
+    IVL_RULE_NONE,
+    IVL_RULE_CONFIG,
+    IVL_RULE_BYPASS,
+    IVL_RULE_REARM,
+    IVL_RULE_BATTERY_REST,
+    IVL_RULE_STATE,
+    IVL_RULE_TILT,
+    IVL_RULE_COMMAND,
+    IVL_RULE_SUPERVISOR,
+    IVL_RULE_LINK,
+    IVL_RULE_SETPOINT,
+    IVL_RULE_HOST,
+    IVL_RULE_BATTERY,
+    IVL_RULE_FENCE,
+    IVL_RULE_SPEED,
+    IVL_RULE_UNCERTAIN,
+    IVL_RULE_TOO_CLOSE,
+    IVL_RULE_APPROACH_TIME,
+    IVL_RULE_CONTACT,
+    IVL_RULE_HANG,
+    IVL_RULE_BLIND,
+    IVL_RULE_FLIP_TIME,
+    IVL_RULE_COAST_TIME,
+    IVL_RULE_LOST,
+    IVL_RULE_LANDED,
+    IVL_RULE_NO_POLICY,
+    IVL_RULE_ONE_SHOT,
+    IVL_RULE_NOT_FRESH,
+    IVL_RULE_CUE,
+    IVL_RULE_COUNT
+} ivl_rule_t;
+
+/// What the port knows about the vehicle beside its motion.  All zero where there is nothing to tell (a world without radio and battery):
+/// then every rule about it is satisfied.
+typedef struct
+{
+    bool  given;           ///< false: the members below mean nothing
+    bool  configured;      ///< the operator has put a configuration in force since the start
+    bool  can_fly;         ///< the autopilot around the core lets the motors run
+    bool  bypassed;        ///< somebody drives the motors past the core
+    bool  stock_idle;      ///< the autopilot's own set-point asks for no thrust
+    float vbat_V;          ///< battery
+    float link_age_s;      ///< since the link was last up
+    float setpoint_age_s;  ///< of the autopilot's own set-point
+    float host_age_s;      ///< since the last command of the host
+    float p_sigma_m;       ///< standard deviation of the position estimate, largest axis
+} ivl_vitals_t;
 
 /// One sensed state of the vehicle.
 typedef struct

@@ -56,6 +56,27 @@
     X(uint8_t, "ivl", "cut_on_contact", cut_on_contact, "1", 0, 1, 1, "cut motors at the first sensed contact")                              \
     X(float, "ivl", "contact_accel", contact_accel_mps2, "m/s^2", 12.0, 1000.0, 25.0, "specific force that means contact (a flip makes 10)") \
     X(float, "ivl", "hang_s", hang_s, "s", 0.02, 5.0, 0.2, "specific force reversed for this long means hanging")                            \
+    /* rules: see ivl_guard.c */                                                                                                             \
+    X(float, "ivl", "vbat_rest_min", vbat_V_rest_min, "V", 0.0, 30.0, 3.5, "battery below this refuses to arm")                              \
+    X(float, "ivl", "vbat_min", vbat_V_min, "V", 0.0, 30.0, 3.1, "battery below this aborts")                                                \
+    X(float, "ivl", "link_s_max", link_s_max, "s", 0.0, 10.0, 0.5, "link down for longer aborts")                                            \
+    X(float, "ivl", "setpoint_s_max", setpoint_s_max, "s", 0.01, 0.45, 0.4, "set-point of the autopilot older than this aborts")             \
+    X(float, "ivl", "host_s_max", host_s_max, "s", 0.05, 10.0, 0.5, "last command of the host older than this aborts")                       \
+    X(float, "ivl", "p_sigma_max", p_sigma_m_max, "m", 0.001, 10.0, 0.1, "position less certain than this aborts")                           \
+    X(float, "ivl", "speed_abort", speed_abort_mps, "m/s", 0.1, 50.0, 9.0, "sensed speed above this aborts")                                 \
+    X(float, "ivl", "d_abort", d_abort_m, "m", 0.0, 1.0, 0.0, "an approach this close to the ceiling aborts")                                \
+    X(float, "ivl", "fence_x_min", fence_x_m_min, "m", -200.0, 200.0, -100.0, "ready and approach abort outside this box in W")              \
+    X(float, "ivl", "fence_x_max", fence_x_m_max, "m", -200.0, 200.0, 100.0, "same box")                                                     \
+    X(float, "ivl", "fence_y_min", fence_y_m_min, "m", -200.0, 200.0, -100.0, "same box")                                                    \
+    X(float, "ivl", "fence_y_max", fence_y_m_max, "m", -200.0, 200.0, 100.0, "same box")                                                     \
+    X(float, "ivl", "fence_z_min", fence_z_m_min, "m", -200.0, 200.0, -100.0, "same box")                                                    \
+    X(float, "ivl", "fence_z_max", fence_z_m_max, "m", -200.0, 200.0, 100.0, "same box")                                                     \
+    /* after an abort, and changes of the controller */                                                                                      \
+    X(float, "ivl", "abort_hover_s", abort_hover_s, "s", 0.0, 60.0, 2.0, "hover after an abort before landing")                              \
+    X(float, "ivl", "land_speed", land_speed_mps, "m/s", 0.05, 2.0, 0.3, "speed of the descent after an abort")                              \
+    X(float, "ivl", "land_height", land_height_m, "m", -100.0, 100.0, 0.05, "height in W at which the landing is over")                      \
+    X(float, "ivl", "rearm_s", rearm_s, "s", 0.0, 60.0, 1.0, "rest upright before another controller gets the motors back")                  \
+    X(float, "ivl", "handover_s", handover_s, "s", 0.0, 2.0, 0.3, "a step of thrust between two controllers fades in this")                  \
     /* thrust curve [S]: PWM = a tan((f - b) / c) + d, f in gram-force */                                                                    \
     X(float, "ivl", "pwm_a", pwm_a, "1", 1.0, 1.0e6, 33100.0, "scale of the thrust curve")                                                   \
     X(float, "ivl", "pwm_b", pwm_b_gf, "gf", -100.0, 100.0, 8.72, "thrust at the middle of the thrust curve")                                \
@@ -69,6 +90,9 @@
 #define IVL_LOGS(X)                                                                                                      \
     X(uint8_t, "ivl", "phase", ivl_out_t, phase_log, "1", "phase number, see ivl_phase_t")                               \
     X(uint8_t, "ivl", "motors_on", ivl_out_t, motors_on, "1", "1 while any motor may run")                               \
+    X(uint8_t, "ivl", "stock_allowed", ivl_out_t, stock_allowed, "1", "1 while another controller may have the motors")  \
+    X(uint8_t, "ivl", "rule", ivl_state_t, guard.rule, "1", "safety rule that holds now, see ivl_rule_t")                \
+    X(uint8_t, "ivl", "cause", ivl_state_t, guard.cause, "1", "safety rule that last ended a phase of this cycle")       \
     X(float, "ivl", "thrust1", ivl_out_t, thrust_N[0], "N", "thrust command, front right")                               \
     X(float, "ivl", "thrust2", ivl_out_t, thrust_N[1], "N", "thrust command, rear right")                                \
     X(float, "ivl", "thrust3", ivl_out_t, thrust_N[2], "N", "thrust command, rear left")                                 \

@@ -63,6 +63,13 @@ static bool approach_is_good(const ivl_command_t *cmd, const ivl_cfg_t *cfg)
            (cmd->angle_rad < 1.5708f);
 }
 
+static bool vitals_are_good(const ivl_vitals_t *v, const ivl_cfg_t *cfg)
+{
+    return !v->given ||
+           (v->can_fly && (v->vbat_V >= cfg->vbat_V_min) && (v->link_age_s <= cfg->link_s_max) &&
+            (v->setpoint_age_s <= cfg->setpoint_s_max) && (v->host_age_s <= cfg->host_s_max) && (v->p_sigma_m <= cfg->p_sigma_m_max));
+}
+
 // ---- random vehicles and inputs
 
 static void random_cfg(flight_t *f)
@@ -117,6 +124,27 @@ static void random_state(flight_t *f)
     }
 }
 
+// mostly good; each member bad now and then, sometimes no number
+static void random_vitals(flight_t *f)
+{
+    const float   bad = (rng_below(&f->rng, 2) == 0u) ? NAN : 11.0f;
+    ivl_vitals_t *v = &f->fix.in.vitals;
+    *v = (ivl_vitals_t){.given = rng_below(&f->rng, 4) != 0u, .vbat_V = 4.0f};
+    v->configured = rng_below(&f->rng, 16) != 0u;
+    v->can_fly = rng_below(&f->rng, 16) != 0u;
+    v->bypassed = rng_below(&f->rng, 16) == 0u;
+    v->stock_idle = rng_below(&f->rng, 2) == 0u;
+    float *const ages[] = {&v->link_age_s, &v->setpoint_age_s, &v->host_age_s, &v->p_sigma_m};
+    for (int i = 0; i < 4; i++)
+    {
+        *ages[i] = (rng_below(&f->rng, 24) == 0u) ? bad : 0.0f;
+    }
+    if (rng_below(&f->rng, 24) == 0u)
+    {
+        v->vbat_V = isnan(bad) ? bad : 3.0f;
+    }
+}
+
 static void next_input(flight_t *f)
 {
     ivl_in_t      *in = &f->fix.in;
@@ -130,6 +158,10 @@ static void next_input(flight_t *f)
     if (rng_below(&f->rng, 30) == 0u)
     {
         random_state(f);
+    }
+    if (rng_below(&f->rng, 60) == 0u)
+    {
+        random_vitals(f);
     }
     if (rng_below(&f->rng, 100) == 0u)
     {
@@ -174,6 +206,7 @@ static void check_trigger(flight_t *f, uint32_t n_trigger_before, bool is_pose_g
         n_triggers++;
         TEST_ASSERT_EQUAL_UINT32(n_trigger_before + 1u, state->diag.n_trigger);
         TEST_ASSERT_TRUE(is_pose_good && approach_is_good(&f->fix.in.cmd, &f->fix.cfg));
+        TEST_ASSERT_TRUE(vitals_are_good(&f->fix.in.vitals, &f->fix.cfg));
         TEST_ASSERT_TRUE(state->snapshot.rrev_per_s >= state->snapshot.policy.rrev_c_per_s);
         TEST_ASSERT_TRUE((state->snapshot.rrev_per_s > 0.0f) && (state->snapshot.d_ceil_m > 0.0f));
         memcpy(&f->snapshot, &state->snapshot, sizeof f->snapshot);

@@ -60,16 +60,17 @@ static void test_request_idle_leads_to_idle_from_every_phase_at_once(void)
     }
 }
 
-static void test_request_abort_hovers_before_the_trigger_and_cuts_after_it(void)
+static void test_request_abort_hovers_before_the_trigger_and_does_nothing_after_it(void)
 {
-    const ivl_phase_t expected[] = {IVL_PHASE_IDLE,  IVL_PHASE_ABORTED,  IVL_PHASE_ABORTED, IVL_PHASE_COAST,
+    const ivl_phase_t expected[] = {IVL_PHASE_IDLE,  IVL_PHASE_ABORTED,  IVL_PHASE_ABORTED, IVL_PHASE_FLIP,
                                     IVL_PHASE_COAST, IVL_PHASE_ATTACHED, IVL_PHASE_DONE,    IVL_PHASE_ABORTED};
     for (size_t i = 0; i < IVL_PHASE_COUNT; i++)
     {
         fix_to_phase(&fix, ALL[i]);
         fix_request(&fix, IVL_REQUEST_ABORT);
         assert_phase(expected[i], &fix);
-        TEST_ASSERT_EQUAL_INT(expected[i] == IVL_PHASE_ABORTED, fix.out.motors_on);
+        const bool is_on = (expected[i] == IVL_PHASE_ABORTED) || (expected[i] == IVL_PHASE_FLIP);
+        TEST_ASSERT_EQUAL_INT(is_on, fix.out.motors_on);
     }
 }
 
@@ -357,7 +358,7 @@ int main(void)
     RUN_TEST(test_each_phase_can_be_reached_and_stays_when_nothing_changes);
     RUN_TEST(test_motors_run_in_four_phases_only);
     RUN_TEST(test_request_idle_leads_to_idle_from_every_phase_at_once);
-    RUN_TEST(test_request_abort_hovers_before_the_trigger_and_cuts_after_it);
+    RUN_TEST(test_request_abort_hovers_before_the_trigger_and_does_nothing_after_it);
     RUN_TEST(test_approach_passes_through_ready_in_the_same_tick);
     RUN_TEST(test_approach_triggers_in_the_first_tick_when_the_threshold_is_zero);
     RUN_TEST(test_approach_waits_in_ready_for_the_policy_and_the_minimum_stay);

@@ -1,0 +1,330 @@
+/// @file ivl_guard.c
+/// The rules.  Read the table first; docs/SAFETY.md says on which property of the vehicle each row rests.
+#include "ivl_guard.h"
+
+#include "ivl_math.h"
+
+// ---- conditions: pure questions about this tick.  Written in positive form and negated, so that a NaN counts as the bad case.
+
+typedef struct
+{
+    ivl_ceiling_t ceiling;
+    ivl_cues_t    cues;
+} seen_t;
+
+typedef bool (*condition_t)(const ivl_cfg_t *cfg, const ivl_state_t *state, const seen_t *seen);
+
+#define CONDITION(name) static bool name(const ivl_cfg_t *cfg, const ivl_state_t *state, const seen_t *seen)
+#define UNUSED(x)       ((void)(x))
+
+static bool elapsed(const ivl_state_t *state, float limit_s)
+{
+    return (float)state->n_phase_tick * state->derived.dt_s >= limit_s;
+}
+
+static bool inside(float x, float lo, float hi)
+{
+    return (x >= lo) && (x <= hi);
+}
+
+CONDITION(not_configured)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return state->guard.vitals.given && !state->guard.vitals.configured;
+}
+
+CONDITION(motors_bypassed)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return state->guard.vitals.given && state->guard.vitals.bypassed;
+}
+
+// after a landing only HOVER starts the next cycle: a forgotten APPROACH must not
+CONDITION(not_rearmed)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return state->triggered && (state->sense.cmd.request != IVL_REQUEST_HOVER);
+}
+
+CONDITION(battery_below_rest)
+{
+    UNUSED(seen);
+    return state->guard.vitals.given && !(state->guard.vitals.vbat_V >= cfg->vbat_V_rest_min);
+}
+
+CONDITION(state_old)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return !state->sense.pose_usable;
+}
+
+CONDITION(tipped_over)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return !(state->sense.up_z >= state->derived.cos_tilt_abort);
+}
+
+CONDITION(command_old)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return !state->sense.cmd_usable;
+}
+
+CONDITION(may_not_fly)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return state->guard.vitals.given && !state->guard.vitals.can_fly;
+}
+
+CONDITION(link_down)
+{
+    UNUSED(seen);
+    return state->guard.vitals.given && !(state->guard.vitals.link_age_s <= cfg->link_s_max);
+}
+
+CONDITION(setpoint_old)
+{
+    UNUSED(seen);
+    return state->guard.vitals.given && !(state->guard.vitals.setpoint_age_s <= cfg->setpoint_s_max);
+}
+
+CONDITION(host_silent)
+{
+    UNUSED(seen);
+    return state->guard.vitals.given && !(state->guard.vitals.host_age_s <= cfg->host_s_max);
+}
+
+CONDITION(battery_below)
+{
+    UNUSED(seen);
+    return state->guard.vitals.given && !(state->guard.vitals.vbat_V >= cfg->vbat_V_min);
+}
+
+CONDITION(outside_fence)
+{
+    UNUSED(seen);
+    const ivl_vec3_t p = state->sense.sample.p_WB_m;
+    return !(inside(p.x, cfg->fence_x_m_min, cfg->fence_x_m_max) && inside(p.y, cfg->fence_y_m_min, cfg->fence_y_m_max) &&
+             inside(p.z, cfg->fence_z_m_min, cfg->fence_z_m_max));
+}
+
+CONDITION(too_fast)
+{
+    UNUSED(seen);
+    const ivl_vec3_t v = state->sense.sample.v_WB_mps;
+    return !(ivl_dot(v, v) <= cfg->speed_abort_mps * cfg->speed_abort_mps);
+}
+
+CONDITION(position_uncertain)
+{
+    UNUSED(seen);
+    return state->guard.vitals.given && !(state->guard.vitals.p_sigma_m <= cfg->p_sigma_m_max);
+}
+
+CONDITION(too_close)
+{
+    UNUSED(state);
+    return seen->ceiling.valid && (seen->ceiling.d_ceil_m < cfg->d_abort_m);
+}
+
+CONDITION(approach_too_long)
+{
+    UNUSED(seen);
+    return elapsed(state, cfg->approach_s_max);
+}
+
+CONDITION(contact)
+{
+    UNUSED(seen);
+    return (cfg->cut_on_contact != 0u) && state->contact.contact;
+}
+
+CONDITION(hanging)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return state->contact.hanging;
+}
+
+CONDITION(inputs_lost)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return !(state->sense.pose_usable && state->sense.cmd_usable);
+}
+
+CONDITION(flip_too_long)
+{
+    UNUSED(seen);
+    return elapsed(state, cfg->flip_s_max);
+}
+
+CONDITION(coast_over)
+{
+    UNUSED(seen);
+    return elapsed(state, cfg->coast_s_max);
+}
+
+CONDITION(unable_to_hover)
+{
+    return state_old(cfg, state, seen) || tipped_over(cfg, state, seen);
+}
+
+// on the floor, or the descent has ended long enough ago for it
+static const float SETTLE_S = 2.0f;
+
+CONDITION(landed)
+{
+    UNUSED(seen);
+    return (state->landed_s > 0.0f) && ((state->sense.sample.p_WB_m.z <= cfg->land_height_m) || (state->landed_s >= SETTLE_S));
+}
+
+CONDITION(no_policy)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return !state->has_policy;
+}
+
+CONDITION(has_triggered)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return state->triggered;
+}
+
+CONDITION(not_this_tick)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return !(state->sense.pose_fresh && state->sense.cmd_fresh);
+}
+
+CONDITION(cue_invalid)
+{
+    UNUSED(cfg), UNUSED(state);
+    return !seen->cues.valid;
+}
+
+// ---- the table: the first row that holds counts
+
+#define IDLE     (1u << IVL_PHASE_IDLE)
+#define READY    (1u << IVL_PHASE_READY)
+#define APPROACH (1u << IVL_PHASE_APPROACH)
+#define FLIP     (1u << IVL_PHASE_FLIP)
+#define COAST    (1u << IVL_PHASE_COAST)
+#define ABORTED  (1u << IVL_PHASE_ABORTED)
+#define BEFORE   (IDLE | READY | APPROACH)
+
+typedef struct
+{
+    const char *name;
+    uint32_t    phases;
+    condition_t when;
+    ivl_act_t   act;
+} row_t;
+
+// clang-format off
+static const row_t ROWS[] = {
+    [IVL_RULE_NONE]          = {"none",          0,                NULL,               IVL_ACT_NONE},
+    // to arm
+    [IVL_RULE_CONFIG]        = {"config",        IDLE,             not_configured,     IVL_ACT_REFUSE},
+    [IVL_RULE_BYPASS]        = {"bypass",        IDLE,             motors_bypassed,    IVL_ACT_REFUSE},
+    [IVL_RULE_REARM]         = {"rearm",         IDLE,             not_rearmed,        IVL_ACT_REFUSE},
+    [IVL_RULE_BATTERY_REST]  = {"battery_rest",  IDLE,             battery_below_rest, IVL_ACT_REFUSE},
+    // before the trigger: refuses to arm, later aborts
+    [IVL_RULE_STATE]         = {"state",         BEFORE,           state_old,          IVL_ACT_ABORT},
+    [IVL_RULE_TILT]          = {"tilt",          BEFORE,           tipped_over,        IVL_ACT_ABORT},
+    [IVL_RULE_COMMAND]       = {"command",       BEFORE,           command_old,        IVL_ACT_ABORT},
+    [IVL_RULE_SUPERVISOR]    = {"supervisor",    BEFORE,           may_not_fly,        IVL_ACT_ABORT},
+    [IVL_RULE_LINK]          = {"link",          BEFORE,           link_down,          IVL_ACT_ABORT},
+    [IVL_RULE_SETPOINT]      = {"setpoint",      BEFORE,           setpoint_old,       IVL_ACT_ABORT},
+    [IVL_RULE_HOST]          = {"host",          BEFORE,           host_silent,        IVL_ACT_ABORT},
+    [IVL_RULE_BATTERY]       = {"battery",       BEFORE,           battery_below,      IVL_ACT_ABORT},
+    [IVL_RULE_FENCE]         = {"fence",         BEFORE,           outside_fence,      IVL_ACT_ABORT},
+    [IVL_RULE_SPEED]         = {"speed",         BEFORE,           too_fast,           IVL_ACT_ABORT},
+    [IVL_RULE_UNCERTAIN]     = {"uncertain",     BEFORE,           position_uncertain, IVL_ACT_ABORT},
+    [IVL_RULE_TOO_CLOSE]     = {"too_close",     APPROACH,         too_close,          IVL_ACT_ABORT},
+    [IVL_RULE_APPROACH_TIME] = {"approach_time", APPROACH,         approach_too_long,  IVL_ACT_ABORT},
+    // after the trigger: nothing but contact, loss of all senses and the clock ends a flip
+    [IVL_RULE_CONTACT]       = {"contact",       FLIP | COAST,     contact,            IVL_ACT_ATTACH},
+    [IVL_RULE_HANG]          = {"hang",          FLIP | COAST,     hanging,            IVL_ACT_ATTACH},
+    [IVL_RULE_BLIND]         = {"blind",         FLIP,             inputs_lost,        IVL_ACT_CUT},
+    [IVL_RULE_FLIP_TIME]     = {"flip_time",     FLIP,             flip_too_long,      IVL_ACT_CUT},
+    [IVL_RULE_COAST_TIME]    = {"coast_time",    COAST,            coast_over,         IVL_ACT_CUT},
+    // after an abort
+    [IVL_RULE_LOST]          = {"lost",          ABORTED,          unable_to_hover,    IVL_ACT_CUT},
+    [IVL_RULE_LANDED]        = {"landed",        ABORTED,          landed,             IVL_ACT_CUT},
+    // the trigger
+    [IVL_RULE_NO_POLICY]     = {"no_policy",     APPROACH,         no_policy,          IVL_ACT_HOLD},
+    [IVL_RULE_ONE_SHOT]      = {"one_shot",      APPROACH,         has_triggered,      IVL_ACT_HOLD},
+    [IVL_RULE_NOT_FRESH]     = {"not_fresh",     APPROACH,         not_this_tick,      IVL_ACT_HOLD},
+    [IVL_RULE_CUE]           = {"cue",           APPROACH,         cue_invalid,        IVL_ACT_HOLD},
+};
+// clang-format on
+
+_Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_RULE_COUNT, "one row a rule");
+_Static_assert(IVL_RULE_COUNT <= 255, "a rule is logged in one byte");
+
+ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues)
+{
+    const seen_t   seen = {ceiling, cues};
+    const uint32_t phase = 1u << state->phase;
+    for (int i = 0; i < (int)IVL_RULE_COUNT; i++)
+    {
+        if (((ROWS[i].phases & phase) != 0u) && ROWS[i].when(cfg, state, &seen))
+        {
+            return (ivl_rule_t)i;
+        }
+    }
+    return IVL_RULE_NONE;
+}
+
+static bool is_rule(ivl_rule_t rule)
+{
+    return (unsigned)rule < (unsigned)IVL_RULE_COUNT;
+}
+
+ivl_act_t ivl_guard_act(ivl_rule_t rule)
+{
+    return is_rule(rule) ? ROWS[rule].act : IVL_ACT_NONE;
+}
+
+bool ivl_guard_applies(ivl_rule_t rule, ivl_phase_t phase)
+{
+    return is_rule(rule) && ((unsigned)phase < (unsigned)IVL_PHASE_COUNT) && ((ROWS[rule].phases & (1u << phase)) != 0u);
+}
+
+const char *ivl_guard_name(ivl_rule_t rule)
+{
+    return is_rule(rule) ? ROWS[rule].name : "?";
+}
+
+// ---- lock-out
+
+// what counts as resting upright: within 20 degrees, nearly no rotation, nearly no acceleration
+static const float REST_UP_Z_MIN = 0.94f;
+static const float REST_RATE_RADPS_MAX = 0.3f;
+static const float REST_FORCE_MPS2_TOL = 2.0f;
+
+static bool resting(const ivl_cfg_t *cfg, const ivl_state_t *state)
+{
+    const ivl_sense_t *sense = &state->sense;
+    return state->guard.vitals.given && state->guard.vitals.stock_idle && sense->pose_fresh && (sense->up_z >= REST_UP_Z_MIN) &&
+           ivl_vec3_within(sense->sample.w_B_radps, REST_RATE_RADPS_MAX) &&
+           ivl_within(sense->sample.f_B_mps2.z - cfg->gravity_mps2, REST_FORCE_MPS2_TOL);
+}
+
+void ivl_guard_lock_out(const ivl_cfg_t *cfg, ivl_state_t *state)
+{
+    ivl_guard_t *guard = &state->guard;
+    if ((state->phase == IVL_PHASE_READY) || (state->phase == IVL_PHASE_APPROACH))
+    {
+        guard->locked_out = false;
+    }
+    if ((state->phase == IVL_PHASE_FLIP) || ((state->phase == IVL_PHASE_ABORTED) && state->abort_cut))
+    {
+        guard->locked_out = true;
+    }
+    guard->rest_s =
+        (guard->locked_out && (state->phase == IVL_PHASE_IDLE) && resting(cfg, state)) ? guard->rest_s + state->derived.dt_s : 0.0f;
+    if (guard->rest_s > cfg->rearm_s)
+    {
+        guard->locked_out = false;
+    }
+}
