@@ -21,10 +21,8 @@ ifeq ($(FLAVOUR),stm32-clang)
 HEADERS   = $(firstword $(wildcard /usr/lib/arm-none-eabi/include $(dir $(shell $(LINKER) -print-file-name=libc.a))../include))
 COMPILER := $(CLANG) --target=thumbv7em-none-eabihf
 SYSTEM    = -isystem $(HEADERS)
-ANALYSE  :=
 else
 COMPILER := $(LINKER)
-ANALYSE  := -fstack-usage -fcallgraph-info=su,da
 endif
 
 WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
@@ -98,7 +96,7 @@ run-test_%: $(BUILD)/test_%.elf FORCE
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(SYSTEM) $(WARNINGS) $(ANALYSE) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(SYSTEM) $(WARNINGS) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
 endef
 
 $(BUILD)/%.o: %.c $(BUILD)/flags.txt

@@ -1,0 +1,98 @@
+"""Landings of the simulator, recorded as requests to the flight core and its replies on this computer (sim_pil/record.h)."""
+
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import ivl
+import numpy as np
+from ivl import native
+
+GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
+VEHICLES = ("habas2021", "crazyflie21")
+_ERROR_BYTES = 256
+_ROLLOUTS = 12  # of a batch, which has one vehicle, one gear and one set of parameters
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Two files with as many records: what was asked, and (after the greeting) what was answered."""
+
+    requests: Path
+    replies: Path
+
+
+def record(folder: Path, n_ticks: int, seed: int, fault_norm: float = 0.01) -> Recording:
+    """Fly until `n_ticks` or more are recorded: six gears in turn, each batch with parameters and faults of its own."""
+    recording = Recording(folder / f"requests-{seed}.bin", folder / f"replies-{seed}.bin")
+    rng = np.random.default_rng(seed)
+    n_batch, flown = 0, 0
+    with _recorder(recording, fault_norm, seed) as attach:
+        while flown < n_ticks:
+            gear, vehicle = GEARS[n_batch % len(GEARS)], VEHICLES[n_batch // len(GEARS) % len(VEHICLES)]
+            world = ivl.World(vehicle, gear, "as_simulated", **_overrides(rng))
+            attach(world)
+            flown += _fly(world, rng)
+            n_batch += 1
+    return recording
+
+
+def _fly(world: ivl.World, rng: np.random.Generator) -> int:
+    """One batch with random approaches and policies; returns its ticks."""
+    start = str(rng.choice(["imparted", "flown", "at_trigger"]))
+    distance = rng.uniform(0.05, 0.6, _ROLLOUTS) if start == "at_trigger" else None
+    outcomes = world.rollouts(
+        rng.uniform(1.0, 4.0, _ROLLOUTS), rng.uniform(20.0, 90.0, _ROLLOUTS), rng.uniform(1.0, 7.0, _ROLLOUTS),
+        rng.uniform(0.0, 12.0, _ROLLOUTS), seed=int(rng.integers(2**32)), start=start, d_ceil_m=distance, threads=1,
+    )  # fmt: skip
+    return int(outcomes.n_ticks.sum())
+
+
+def _overrides(rng: np.random.Generator) -> dict[str, float]:
+    """Noise, delays, and flight parameters all over their ranges; phases that end soon, so that all come often."""
+    return {
+        "sense.latency": rng.uniform(0.0, 0.03),
+        "sense.position_noise": rng.uniform(0.0, 0.01),
+        "sense.velocity_noise": rng.uniform(0.0, 0.1),
+        "sense.attitude_noise": rng.uniform(0.0, 0.02),
+        "sense.gyro_noise": rng.uniform(0.0, 0.1),
+        "sense.accel_noise": rng.uniform(0.0, 1.0),
+        "firmware.ready_s_min": rng.uniform(0.0, 0.2),
+        "firmware.coast_s_max": rng.uniform(0.1, 0.5),
+        "firmware.attached_s": rng.uniform(0.0, 0.3),
+        "firmware.flip_s_max": rng.uniform(0.02, 0.5),
+        "firmware.approach_s_max": rng.uniform(0.5, 3.0),
+        "firmware.stale_s_max": rng.uniform(0.04, 0.2),
+        "firmware.kp_pos_xy": rng.uniform(0.0, 4.0),
+        "firmware.kp_pos_z": rng.uniform(0.2, 5.0),
+        "firmware.kd_rate_xy": rng.uniform(0.0005, 0.004),
+        "firmware.tilt_cmd_max": rng.uniform(0.1, 1.2),
+        "firmware.cut_at_inverted": float(rng.integers(2)),
+        "firmware.cut_on_contact": float(rng.integers(2)),
+        "end.time_max": 4.0,
+        "end.contact_time": rng.uniform(0.2, 1.0),
+    }
+
+
+@contextmanager
+def _recorder(recording: Recording, fault_norm: float, seed: int) -> Iterator:
+    c = native.library().c
+    c.ivl_record_create.restype = ctypes.c_void_p
+    c.ivl_record_create.argtypes = [ctypes.c_char_p] * 2 + [ctypes.c_double, ctypes.c_uint64, ctypes.c_char_p, ctypes.c_size_t]
+    c.ivl_record_attach.argtypes = [ctypes.c_void_p] * 2
+    c.ivl_record_close.argtypes = [ctypes.c_void_p]
+    error = ctypes.create_string_buffer(_ERROR_BYTES)
+    paths = [str(path).encode() for path in (recording.requests, recording.replies)]
+    handle = c.ivl_record_create(*paths, fault_norm, seed, error, _ERROR_BYTES)
+    if not handle:
+        raise OSError(error.value.decode())
+    failed = True
+    try:
+        yield lambda world: c.ivl_record_attach(handle, world.native_model.handle)
+        failed = False
+    finally:
+        status = c.ivl_record_close(handle)
+    if not failed and status != 0:
+        raise OSError(f"{recording.requests}: the recording could not be written completely")
