@@ -11,7 +11,7 @@ import os
 # It has to be said before numpy is loaded; a caller who has said otherwise is respected.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from ivl.errors import ConfigError, IvlError, LearnerError, NativeError, RolloutError, StoreError
+from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError, NativeError, RolloutError, StoreError
 from ivl.experiment import Experiment
 from ivl.learners import EPHE, Learner, RobustEPHE, make_learner
 from ivl.outcome import clean, four_leg
@@ -19,6 +19,7 @@ from ivl.world import Trace, World
 
 __all__ = [
     "EPHE",
+    "ArgumentError",
     "ConfigError",
     "Experiment",
     "IvlError",

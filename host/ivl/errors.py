@@ -18,7 +18,11 @@ class NativeError(IvlError):
 
 
 class RolloutError(IvlError):
-    """A rollout could not be asked for (arguments) or could not be flown (source failed)."""
+    """A rollout could not be flown."""
+
+
+class ArgumentError(RolloutError, ValueError):
+    """A rollout was asked for with an argument that is out of range or of the wrong kind (also a ValueError)."""
 
 
 class LearnerError(IvlError, ValueError):

@@ -181,7 +181,7 @@ class NativeModel:
         for _ in range(2):
             n_rows = self._trace_into(spec, period_s, rows, outcome)
             if n_rows <= rows.size:
-                return rows[:n_rows].copy(), outcome
+                return rows[:n_rows], outcome
             rows = np.zeros(n_rows, dtype=self._library.trace_dtype)
         raise NativeError(f"the trace needs {n_rows} rows after {rows.size} had been promised")
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl import model, native
-from ivl.errors import NativeError, RolloutError
+from ivl.errors import ArgumentError, NativeError
 
 START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2}
 _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within seconds
@@ -137,14 +137,14 @@ class World:
             Record array of outcomes in the shape of the broadcast; fields of the library's outcome table.
 
         Raises:
-            RolloutError: An argument is not finite, out of range, or does not broadcast.
+            ArgumentError: An argument is not finite, out of range, or does not broadcast.
         """
         specs, shape = self._specs(
             start, stream, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
             moment_y_Nmm=moment_y_Nmm, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         n_threads = _check_threads(threads)
-        outcomes = np.empty(specs.shape, dtype=self._library.outcome_dtype)
+        outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
         for first in range(0, specs.size, _BATCH_ROLLOUTS):
             part = slice(first, first + _BATCH_ROLLOUTS)
             outcomes[part] = self._native.rollouts(specs[part], n_threads)
@@ -168,9 +168,9 @@ class World:
             moment_y_Nmm=moment_y_Nmm, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         if shape != ():
-            raise RolloutError(f"trace: the arguments must be scalars, they broadcast to {shape}")
+            raise ArgumentError(f"trace: the arguments must be scalars, they broadcast to {shape}")
         if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
-            raise RolloutError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
+            raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
         rows, outcome = self._native.trace(specs, period_s)
         return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
 
@@ -179,19 +179,21 @@ class World:
     ) -> tuple[npt.NDArray[np.void], tuple[int, ...]]:
         """Checked, broadcast and flattened rollout specifications, and the shape they had."""
         if start not in START_CODES:
-            raise RolloutError(f"start: value {start!r} is unknown (allowed {', '.join(START_CODES)})")
+            raise ArgumentError(f"start: value {start!r} is unknown (allowed {', '.join(START_CODES)})")
         if (start == "at_trigger") != (arguments["d_ceil_m"] is not None):
-            raise RolloutError(
+            raise ArgumentError(
                 f"d_ceil_m: value {arguments['d_ceil_m']!r}: start='at_trigger' needs it, others must not have it"
             )
-        given = {name: _numbers(name, value) for name, value in arguments.items() if value is not None}
+        given = {
+            name: _numbers(name, value) for name, value in arguments.items() if name != "d_ceil_m" or value is not None
+        }
         if stream is not None:
             given["stream"] = _numbers("stream", stream)
         try:
             shape = np.broadcast_shapes(*(array.shape for array in given.values()))
         except ValueError as error:
             shapes = ", ".join(f"{name} {array.shape}" for name, array in given.items() if array.shape)
-            raise RolloutError(f"the arguments do not broadcast: {shapes}") from error
+            raise ArgumentError(f"the arguments do not broadcast: {shapes}") from error
         specs = np.zeros(int(np.prod(shape, dtype=np.int64)), dtype=self._library.spec_dtype)
         specs["start"] = START_CODES[start]
         specs["d_ceil_m"] = self._library.spec_fields["d_ceil_m"].default
@@ -208,7 +210,7 @@ class World:
         good = np.isfinite(array) & (array >= field.lo) & (array <= field.hi)
         if not good.all():
             value = float(array[~good].flat[0])
-            raise RolloutError(
+            raise ArgumentError(
                 f"{name}: value {value!r} is out of range (allowed {field.lo:g} .. {field.hi:g} {field.unit})"
             )
 
@@ -217,11 +219,11 @@ def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
     """The argument as a float64 array, seeds and streams as uint64."""
     array = np.asarray(value)
     if array.dtype.kind not in "iuf" or array.dtype == np.longdouble:
-        raise RolloutError(f"{name}: value {value!r} is not a number or an array of numbers")
+        raise ArgumentError(f"{name}: value {value!r} is not a number or an array of numbers")
     if name not in ("seed", "stream"):
         return array.astype(np.float64)
     if array.dtype.kind == "f" or (array.size and int(array.min()) < 0):
-        raise RolloutError(f"{name}: value {value!r} must be a whole number (allowed 0 .. {_SEED_MAX})")
+        raise ArgumentError(f"{name}: value {value!r} must be a whole number (allowed 0 .. {_SEED_MAX})")
     return array.astype(np.uint64)
 
 
@@ -229,5 +231,5 @@ def _check_threads(threads: int | None) -> int:
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= _THREADS_MAX:
-        raise RolloutError(f"threads: value {threads!r} is out of range (allowed 1 .. {_THREADS_MAX})")
+        raise ArgumentError(f"threads: value {threads!r} is out of range (allowed 1 .. {_THREADS_MAX})")
     return threads

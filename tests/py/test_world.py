@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import ivl
-from ivl.errors import ConfigError, NativeError, RolloutError
+from ivl.errors import ArgumentError, ConfigError, NativeError
 
 APPROACH = {"speed_mps": 2.5, "angle_deg": 90.0}
 POLICY = {"rrev_c_per_s": 4.8, "moment_y_Nmm": 8.0}
@@ -128,19 +128,19 @@ def test_flown_start_reaches_the_approach_speed(world: ivl.World) -> None:
     ],
 )  # fmt: skip
 def test_a_bad_argument_is_refused_with_its_range(world: ivl.World, arguments: dict[str, object], message: str) -> None:
-    with pytest.raises(RolloutError) as caught:
+    with pytest.raises(ArgumentError) as caught:
         world.rollouts(**{**APPROACH, **POLICY, **arguments})
     assert message in str(caught.value)
 
 
 @pytest.mark.parametrize("period_s", [0.0, -1.0, float("nan"), 2.0])
 def test_a_bad_trace_period_is_refused(world: ivl.World, period_s: float) -> None:
-    with pytest.raises(RolloutError, match="period_s"):
+    with pytest.raises(ArgumentError, match="period_s"):
         world.trace(**APPROACH, **POLICY, period_s=period_s)
 
 
 def test_trace_refuses_arrays(world: ivl.World) -> None:
-    with pytest.raises(RolloutError, match="must be scalars"):
+    with pytest.raises(ArgumentError, match="must be scalars"):
         world.trace(2.5, 90.0, [4.0, 5.0], 8.0)  # type: ignore[arg-type]
 
 
@@ -162,8 +162,8 @@ def test_derived_values_follow_from_the_parameters(world: ivl.World) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(
-    speed=st.floats(0.1, 6.0),
-    angle=st.floats(0.0, 90.0),
+    speed=st.floats(0.25, 6.0),
+    angle=st.floats(20.0, 90.0),
     rrev=st.floats(0.0, 20.0),
     moment=st.floats(0.0, 20.0),
     seed=st.integers(0, 2**64 - 1),
@@ -178,3 +178,23 @@ def test_any_rollout_in_range_ends_with_a_sane_outcome(
     assert np.isfinite(out.d_min_m)
     assert np.isfinite(out.t_end_s)
     assert world.end_reason(out.end_reason) not in ("?", "not_finite", "refused")
+
+
+@pytest.mark.parametrize("start", ["imparted", "flown"])
+def test_a_start_inside_the_ceiling_spoils_no_other_rollout(world: ivl.World, start: str) -> None:
+    angle_deg = np.full(40, 90.0)
+    angle_deg[5] = 0.0  # no vertical speed: it would start at the ceiling
+    mixed = world.rollouts(2.5, angle_deg, 4.8, 8.0, start=start, threads=1)
+    plain = world.rollouts(2.5, 90.0, 4.8, np.full(40, 8.0), start=start, threads=1)
+    others = np.arange(40) != 5
+    assert same(mixed[others], plain[others])
+    assert not ivl.four_leg(mixed)[5]
+
+
+@pytest.mark.parametrize("gear_set", ["as_simulated", "table1"])
+def test_every_noisy_landing_comes_to_an_end(gear_set: str) -> None:
+    world = ivl.World("habas2021", "wide_short", gear_set, **NOISE)
+    rrev_c_per_s, moment_y_Nmm = np.random.default_rng(1).uniform([[4], [5]], [[6], [10]], (2, 2000))
+    out = world.rollouts(2.5, 90.0, rrev_c_per_s, moment_y_Nmm)
+    ends = {world.end_reason(code) for code in np.unique(out.end_reason)}
+    assert ends <= {"contact_time", "missed", "missed_time", "time_max"}

@@ -8,7 +8,7 @@ import sys
 import typer
 
 from ivl.cli import bench, console, learn, listing, rollout
-from ivl.errors import ConfigError, IvlError, LearnerError
+from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
 
 app = typer.Typer(
     name="ivl",
@@ -29,7 +29,7 @@ def run(arguments: list[str] | None = None) -> int:
     try:
         result = app(arguments, standalone_mode=False)
         return int(result or 0)
-    except (ConfigError, LearnerError) as error:
+    except (ConfigError, ArgumentError, LearnerError) as error:
         return _fail(str(error), 2)
     except IvlError as error:
         return _fail(str(error), 1)

@@ -1,9 +1,17 @@
 """Bayesian optimisation: a Gaussian process on the returns, and Thompson sampling for the next episode.
 
-The first episode is drawn from N(mu0, sigma0); after that each proposal is the maximiser of one joint draw from the
-posterior over a cloud of candidates (uniform in the box, and near the best point). Recommended is the point of the
-largest lower confidence value, mean - caution sd. It needs the fewest crashes of the learners here and more computing
-than the others.
+Every rollout counts for as long as it is remembered, failed ones too: they tell where the landing is not. In units of
+the start's spread, z = (theta - mu0) / sigma0, with y the returns shifted and scaled to mean 0 and variance 1:
+
+    first episode     theta ~ N(mu0, diag sigma0^2), truncated to the bounds                             (1)
+    model             y = f(z) + noise, f a Gaussian process (see `ivl.learners.gp`), refitted after each episode
+    later episodes    theta_n = argmax over the candidates of f_n, f_n a draw of the posterior           (2)
+    recommended       argmax(mean(z) - caution sd(z))                                                    (3)
+
+Candidates are uniform in the box and normal about the best remembered policies and the recommended one, spread by a share
+of the kernel's lengths. Draws that differ where the returns are uncertain and agree where they are known make the search
+turn from exploring to repeating by itself: no spread shrinks by rule, so none collapses on a shelf beside the target. A
+kernel wider than the landing window is harmless in (2), and averages noisy returns in (3).
 """
 
 from collections.abc import Mapping
@@ -19,51 +27,53 @@ _SEARCH_ROUNDS = 4
 
 
 class BOOptions(Options):
-    """Options of Bayesian optimisation; lengths are in units of the box's width."""
+    """Options of Bayesian optimisation; lengths are in units of sigma0."""
 
-    length: float = Field(default=0.12, gt=0, le=10, description="prior kernel length in each dimension")
-    noise: float = Field(default=0.1, gt=0, le=10, description="prior ratio of noise variance to signal variance")
-    caution: float = Field(default=0.3, ge=0, le=10, description="recommended = argmax(mean - caution sd)")
-    n_uniform: int = Field(default=300, ge=10, le=5000, description="candidates over the whole box")
-    n_near: int = Field(default=150, ge=10, le=5000, description="candidates near the best point")
-    jitter: float = Field(default=0.04, gt=0, le=1, description="spread of the near candidates")
+    length: float = Field(default=0.5, gt=0, le=100, description="prior kernel length in each dimension")
+    noise: float = Field(default=0.2, gt=0, le=10, description="prior ratio of noise variance to signal variance")
+    caution: float = Field(default=0.5, ge=0, le=10, description="recommended = argmax(mean - caution sd)")
+    n_uniform: int = Field(default=400, ge=10, le=5000, description="candidates over the whole box")
+    n_near: int = Field(default=300, ge=10, le=5000, description="candidates near what was best")
+    n_elite: int = Field(default=20, ge=1, le=1000, description="policies that count as best")
+    jitter: float = Field(default=0.25, gt=0, le=10, description="spread of the near candidates, in kernel lengths")
+    memory: int = Field(default=400, ge=8, le=4000, description="latest rollouts that the model is made from")
 
 
 class BOLearner(Learner):
-    """Gaussian process and Thompson sampling."""
+    """Gaussian process and Thompson sampling; `mu`, `sigma` are the recommended policy and the spread of the proposals."""
 
     Options: ClassVar[type[Options]] = BOOptions
     needs_bounds: ClassVar[bool] = True
     options: BOOptions
 
     def _setup(self) -> None:
-        self._x = np.empty((0, self.dim))  # in the unit box
+        self._x = np.empty((0, self.dim))  # z of the module's text
         self._rewards = np.empty(0)
+        self._box = self._scale(np.stack([self.lo, self.hi]))
         self._prior = Hyper(np.full(self.dim, self.options.length), self.options.noise)
         self._hyper = self._prior
         self._gp: GaussianProcess | None = None
-        self._best = self._scale(self.mu0)
+        self._best = np.zeros(self.dim)
         self._spread = self.sigma0.copy()
 
     def _ask(self, n: int) -> FloatArray:
         if self._gp is None:
-            return draw_truncated(self._rng, self.mu0, self.sigma0, self.lo, self.hi, n)
-        candidates = self._candidates()
-        chosen = candidates[self._gp.sample(candidates, n, self._rng).argmax(axis=1)]
-        theta = self._unscale(chosen)
+            return draw_truncated(self._rng, self.mu0, self.sigma0, self.lo, self.hi, n)  # (1)
+        candidates = self._candidates(self._gp)
+        theta = self._unscale(candidates[self._gp.sample(candidates, n, self._rng).argmax(axis=1)])  # (2)
         self._spread = np.asarray(theta.std(axis=0))
         return theta
 
     def _update(self, theta: FloatArray, rewards: FloatArray, _meta: Meta, /) -> None:
-        self._x = np.vstack([self._x, self._scale(theta)])
-        self._rewards = np.append(self._rewards, rewards)
+        self._x = np.vstack([self._x, self._scale(theta)])[-self.options.memory :]
+        self._rewards = np.append(self._rewards, rewards)[-self.options.memory :]
         self._hyper = fit(self._x, self._values(), self._prior, self._hyper)
         self._refresh()
 
     def _refresh(self) -> None:
         """Posterior and recommendation from data and hyper-parameters."""
         self._gp = GaussianProcess(self._x, self._values(), self._hyper)
-        self._best = self._safest()
+        self._best = self._safest(self._gp)
 
     def _values(self) -> FloatArray:
         """Returns, standardised; all equal gives zeros."""
@@ -71,32 +81,36 @@ class BOLearner(Learner):
         centered = self._rewards - self._rewards.mean()
         return np.asarray(centered / scale) if scale > 0 else centered
 
-    def _candidates(self) -> FloatArray:
-        uniform = self._rng.uniform(size=(self.options.n_uniform, self.dim))
-        near = self._best + self.options.jitter * self._rng.standard_normal((self.options.n_near, self.dim))
-        return np.vstack([uniform, np.clip(near, 0.0, 1.0)])
+    def _candidates(self, gp: GaussianProcess) -> FloatArray:
+        uniform = self._rng.uniform(*self._box, size=(self.options.n_uniform, self.dim))
+        elite = np.argsort(-gp.predict(self._x)[0], kind="stable")[: self.options.n_elite]
+        centers = np.vstack([self._x[elite], np.tile(self._best, (len(elite), 1))])
+        near = self._cloud(centers[self._rng.integers(len(centers), size=self.options.n_near)], 1.0, self._rng)
+        return np.vstack([uniform, near])
 
-    def _safest(self) -> FloatArray:
-        """Argmax of mean - caution sd.
+    def _safest(self, gp: GaussianProcess) -> FloatArray:
+        """Equation (3).
 
-        The search has a fixed generator of its own, so that reading a result never shifts the next draw.
+        The search has its own fixed generator, so that reading a result never shifts the next draw.
         """
-        assert self._gp is not None
         rng = np.random.Generator(np.random.PCG64(self.seed))
-        points = np.vstack([self._x, rng.uniform(size=(1000, self.dim))])
-        width = 0.05
-        for _ in range(_SEARCH_ROUNDS):
-            mean, sd = self._gp.predict(points)
+        points = np.vstack([self._x, rng.uniform(*self._box, size=(500, self.dim))])
+        for halvings in range(_SEARCH_ROUNDS + 1):
+            mean, sd = gp.predict(points)
             best = points[int(np.argmax(mean - self.options.caution * sd))]
-            cloud = np.clip(best + width * rng.standard_normal((200, self.dim)), 0.0, 1.0)
-            points, width = np.vstack([best, cloud]), width / 2
+            points = np.vstack([best, self._cloud(np.tile(best, (150, 1)), 0.5**halvings, rng)])
         return np.asarray(best)
 
-    def _scale(self, theta: FloatArray) -> FloatArray:
-        return np.asarray((theta - self.lo) / (self.hi - self.lo))
+    def _cloud(self, centers: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
+        """A normal draw about each centre, `share` of the jitter wide, moved into the box."""
+        width = np.minimum(share * self.options.jitter * self._hyper.lengths, self._box[1] - self._box[0])
+        return np.clip(centers + width * rng.standard_normal(centers.shape), *self._box)
 
-    def _unscale(self, x: FloatArray) -> FloatArray:
-        return np.clip(self.lo + x * (self.hi - self.lo), self.lo, self.hi)
+    def _scale(self, theta: FloatArray) -> FloatArray:
+        return np.asarray((theta - self.mu0) / self.sigma0)
+
+    def _unscale(self, z: FloatArray) -> FloatArray:
+        return np.clip(self.mu0 + self.sigma0 * z, self.lo, self.hi)
 
     def _distribution(self) -> tuple[FloatArray, FloatArray]:
         return self._recommended(), self._spread
@@ -106,7 +120,7 @@ class BOLearner(Learner):
 
     def _state(self) -> dict[str, Any]:
         return {
-            "x": self._x.tolist(),
+            "z": self._x.tolist(),
             "rewards": self._rewards.tolist(),
             "lengths": self._hyper.lengths.tolist(),
             "noise": self._hyper.noise,
@@ -115,7 +129,7 @@ class BOLearner(Learner):
 
     def _load(self, state: Mapping[str, Any]) -> None:
         self._setup()
-        self._x = np.array(state["x"], dtype=np.float64).reshape(-1, self.dim)
+        self._x = np.array(state["z"], dtype=np.float64).reshape(-1, self.dim)
         self._rewards = np.array(state["rewards"], dtype=np.float64)
         self._hyper = Hyper(np.array(state["lengths"], dtype=np.float64), float(state["noise"]))
         self._spread = np.array(state["spread"], dtype=np.float64)

@@ -1,8 +1,15 @@
 """A small Gaussian process: squared-exponential kernel with one length per dimension, and white noise. numpy only.
 
-With R the kernel's correlation matrix and g the ratio of noise to signal variance, y ~ N(0, s^2 (R + g I)). The
-signal variance has the closed form s^2 = y' (R + g I)^-1 y / n, so that only the lengths and g are searched (log
-posterior with log-normal priors).
+With K the kernel's correlation matrix, K_ij = exp(-|(x_i - x_j) / l|^2 / 2), and g the ratio of noise to signal variance:
+
+    y ~ N(0, s^2 (K + g I)),    s^2 = y' (K + g I)^-1 y / n                                              (1)
+    log p(y | l, g) = -n/2 log s^2 - 1/2 log det(K + g I) + const                                        (2)
+
+The signal variance has that closed form, so that only the lengths and g are searched, with log-normal priors. A draw of
+the function at any set of points needs no factor of their joint covariance: a draw of the prior is corrected by what it
+says at the data (Matheron's rule; prior draws from random cosines):
+
+    f(x) = f0(x) + k(x, X) (K + g I)^-1 (y - f0(X) - e),    e ~ N(0, s^2 g I)                            (3)
 """
 
 from dataclasses import dataclass
@@ -14,6 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 
 _PRIOR_LOG_SD = 1.0  # of each length and of the noise ratio, about their prior values
 _JITTER = 1e-8
+_N_COSINES = 200  # of a prior draw
 
 
 @dataclass(frozen=True)
@@ -46,43 +54,44 @@ class GaussianProcess:
             hyper: Lengths and noise ratio.
         """
         self.x, self.hyper = x, hyper
-        self._chol = np.linalg.cholesky(_correlation(x, x, hyper.lengths) + (hyper.noise + _JITTER) * np.eye(len(x)))
-        self._white = np.linalg.solve(self._chol, y)
-        self._alpha = np.linalg.solve(self._chol.T, self._white)
-        self.signal_variance = max(float(self._white @ self._white) / len(x), 1e-12)
-
-    def log_likelihood(self) -> float:
-        """Marginal likelihood with the signal variance at its optimum, up to a constant."""
-        n = len(self.x)
-        return float(-0.5 * n * np.log(self.signal_variance) - np.log(np.diag(self._chol)).sum())
+        self._whiten = np.linalg.inv(_factor(x, hyper))
+        white = self._whiten @ y
+        self._alpha = self._whiten.T @ white
+        self.signal_variance = _signal_variance(white)
 
     def predict(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean and standard deviation of the function (without noise) at x, each of shape (m,)."""
         cross = _correlation(x, self.x, self.hyper.lengths)
-        reduced = np.linalg.solve(self._chol, cross.T)
+        reduced = self._whiten @ cross.T
         variance = np.maximum(1.0 - (reduced**2).sum(axis=0), 0.0)
-        return cross @ self._alpha, np.sqrt(self.signal_variance * variance)
+        return np.asarray(cross @ self._alpha), np.sqrt(self.signal_variance * variance)
 
     def sample(self, x: FloatArray, n: int, rng: np.random.Generator) -> FloatArray:
-        """Joint draws of the function at x, shape (n, m)."""
-        cross = _correlation(x, self.x, self.hyper.lengths)
-        reduced = np.linalg.solve(self._chol, cross.T)
-        covariance = _correlation(x, x, self.hyper.lengths) - reduced.T @ reduced
-        root = _root(covariance)
-        draws = rng.standard_normal((n, len(x))) @ root.T
-        return np.asarray(cross @ self._alpha + np.sqrt(self.signal_variance) * draws)
+        """Draws of the function at x by equation (3), shape (n, m)."""
+        noise_sd = np.sqrt(self.signal_variance * (self.hyper.noise + _JITTER))
+        prior = _prior_draws(np.vstack([self.x, x]), self.hyper.lengths, self.signal_variance, n, rng)
+        at_data = prior[:, : len(self.x)] + noise_sd * rng.standard_normal((n, len(self.x)))
+        correction = self._alpha - at_data @ self._whiten.T @ self._whiten
+        return np.asarray(prior[:, len(self.x) :] + correction @ _correlation(self.x, x, self.hyper.lengths))
 
 
-def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, n_rounds: int = 4) -> Hyper:
+def log_likelihood(x: FloatArray, y: FloatArray, hyper: Hyper) -> float:
+    """Marginal likelihood (2) with the signal variance at its optimum, up to a constant."""
+    factor = _factor(x, hyper)
+    variance = _signal_variance(np.linalg.solve(factor, y))
+    return float(-0.5 * len(x) * np.log(variance) - np.log(np.diag(factor)).sum())
+
+
+def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, n_rounds: int = 3) -> Hyper:
     """Hyper-parameters of the largest posterior density, by a deterministic pattern search from `prior` and `start`."""
     center = prior.log()
 
     def score(vector: FloatArray) -> float:
         penalty = 0.5 * float(((vector - center) ** 2).sum()) / _PRIOR_LOG_SD**2
-        return GaussianProcess(x, y, Hyper.from_log(vector)).log_likelihood() - penalty
+        return log_likelihood(x, y, Hyper.from_log(vector)) - penalty
 
     best = max((center, start.log()), key=score)
-    best_score, step = score(best), 0.8
+    best_score, step = score(best), 0.6
     for _ in range(n_rounds):
         for axis in range(len(best)):
             for sign in (-1.0, 1.0):
@@ -91,20 +100,30 @@ def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, n_rounds: int 
                 trial_score = score(trial)
                 if trial_score > best_score:
                     best, best_score = trial, trial_score
+                    break
         step /= 2
     return Hyper.from_log(best)
 
 
+def _factor(x: FloatArray, hyper: Hyper) -> FloatArray:
+    noise = (hyper.noise + _JITTER) * np.eye(len(x))
+    return np.asarray(np.linalg.cholesky(_correlation(x, x, hyper.lengths) + noise))
+
+
+def _signal_variance(white: FloatArray) -> float:
+    """Equation (1), from L^-1 y; not zero, so that constant values have a likelihood too."""
+    return max(float(white @ white) / len(white), 1e-12)
+
+
 def _correlation(a: FloatArray, b: FloatArray, lengths: FloatArray) -> FloatArray:
-    difference = (a[:, None, :] - b[None, :, :]) / lengths
-    return np.asarray(np.exp(-0.5 * (difference**2).sum(axis=2)))
+    u, v = a / lengths, b / lengths
+    square = (u**2).sum(axis=1)[:, None] + (v**2).sum(axis=1) - 2.0 * u @ v.T
+    return np.asarray(np.exp(-0.5 * np.maximum(square, 0.0)))
 
 
-def _root(covariance: FloatArray) -> FloatArray:
-    """Cholesky factor; where rounding has made the matrix indefinite, with the smallest jitter that repairs it."""
-    jitter = _JITTER
-    while True:
-        try:
-            return np.asarray(np.linalg.cholesky(covariance + jitter * np.eye(len(covariance))), dtype=np.float64)
-        except np.linalg.LinAlgError:
-            jitter *= 10.0
+def _prior_draws(x: FloatArray, lengths: FloatArray, variance: float, n: int, rng: np.random.Generator) -> FloatArray:
+    """Draws from the prior at x, shape (n, m): sums of random cosines, whose covariance tends to the kernel's."""
+    frequency = rng.standard_normal((_N_COSINES, x.shape[1])) / lengths
+    phase = rng.uniform(0.0, 2.0 * np.pi, _N_COSINES)
+    weight = rng.standard_normal((n, _N_COSINES)) * np.sqrt(2.0 * variance / _N_COSINES)
+    return np.asarray(weight @ np.cos(frequency @ x.T + phase[:, None]))
