@@ -8,10 +8,10 @@ the start's spread, z = (theta - mu0) / sigma0, with y the returns shifted and s
     later episodes    theta_n = argmax over the candidates of f_n, f_n a draw of the posterior           (2)
     recommended       argmax(mean(z) - caution sd(z))                                                    (3)
 
-Candidates are uniform in the box and normal about the best remembered policies and the recommended one, spread by a share
-of the kernel's lengths. Draws that differ where the returns are uncertain and agree where they are known make the search
-turn from exploring to repeating by itself: no spread shrinks by rule, so none collapses on a shelf beside the target. A
-kernel wider than the landing window is harmless in (2), and averages noisy returns in (3).
+Candidates are uniform in the box and normal about the best remembered policies and the recommended one, spread by a
+share of the kernel's lengths. Draws differ where the returns are uncertain and agree where they are known, so that the
+search turns from exploring to repeating by itself: no spread shrinks by rule, so none collapses on a shelf beside the
+target.
 """
 
 from collections.abc import Mapping
@@ -40,7 +40,7 @@ class BOOptions(Options):
 
 
 class BOLearner(Learner):
-    """Gaussian process and Thompson sampling; `mu`, `sigma` are the recommended policy and the spread of the proposals."""
+    """Gaussian process and Thompson sampling; `mu` is the recommended policy, `sigma` the spread of the proposals."""
 
     Options: ClassVar[type[Options]] = BOOptions
     needs_bounds: ClassVar[bool] = True
@@ -82,7 +82,7 @@ class BOLearner(Learner):
         return np.asarray(centered / scale) if scale > 0 else centered
 
     def _candidates(self, gp: GaussianProcess) -> FloatArray:
-        uniform = self._rng.uniform(*self._box, size=(self.options.n_uniform, self.dim))
+        uniform = self._uniform(self.options.n_uniform, self._rng)
         elite = np.argsort(-gp.predict(self._x)[0], kind="stable")[: self.options.n_elite]
         centers = np.vstack([self._x[elite], np.tile(self._best, (len(elite), 1))])
         near = self._cloud(centers[self._rng.integers(len(centers), size=self.options.n_near)], 1.0, self._rng)
@@ -94,23 +94,26 @@ class BOLearner(Learner):
         The search has its own fixed generator, so that reading a result never shifts the next draw.
         """
         rng = np.random.Generator(np.random.PCG64(self.seed))
-        points = np.vstack([self._x, rng.uniform(*self._box, size=(500, self.dim))])
+        points = np.vstack([self._x, self._uniform(500, rng)])
         for halvings in range(_SEARCH_ROUNDS + 1):
             mean, sd = gp.predict(points)
             best = points[int(np.argmax(mean - self.options.caution * sd))]
             points = np.vstack([best, self._cloud(np.tile(best, (150, 1)), 0.5**halvings, rng)])
         return np.asarray(best)
 
+    def _uniform(self, n: int, rng: np.random.Generator) -> FloatArray:
+        return rng.uniform(self._box[0], self._box[1], (n, self.dim))
+
     def _cloud(self, centers: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
         """A normal draw about each centre, `share` of the jitter wide, moved into the box."""
         width = np.minimum(share * self.options.jitter * self._hyper.lengths, self._box[1] - self._box[0])
-        return np.clip(centers + width * rng.standard_normal(centers.shape), *self._box)
+        return np.asarray(np.clip(centers + width * rng.standard_normal(centers.shape), self._box[0], self._box[1]))
 
     def _scale(self, theta: FloatArray) -> FloatArray:
         return np.asarray((theta - self.mu0) / self.sigma0)
 
     def _unscale(self, z: FloatArray) -> FloatArray:
-        return np.clip(self.mu0 + self.sigma0 * z, self.lo, self.hi)
+        return np.asarray(np.clip(self.mu0 + self.sigma0 * z, self.lo, self.hi))
 
     def _distribution(self) -> tuple[FloatArray, FloatArray]:
         return self._recommended(), self._spread

@@ -1,13 +1,13 @@
 """A small Gaussian process: squared-exponential kernel with one length per dimension, and white noise. numpy only.
 
-With K the kernel's correlation matrix, K_ij = exp(-|(x_i - x_j) / l|^2 / 2), and g the ratio of noise to signal variance:
+With K_ij = exp(-|(x_i - x_j) / l|^2 / 2) and g the ratio of noise to signal variance:
 
     y ~ N(0, s^2 (K + g I)),    s^2 = y' (K + g I)^-1 y / n                                              (1)
     log p(y | l, g) = -n/2 log s^2 - 1/2 log det(K + g I) + const                                        (2)
 
 The signal variance has that closed form, so that only the lengths and g are searched, with log-normal priors. A draw of
 the function at any set of points needs no factor of their joint covariance: a draw of the prior is corrected by what it
-says at the data (Matheron's rule; prior draws from random cosines):
+says at the data (Matheron's rule; the prior draw is a sum of random cosines):
 
     f(x) = f0(x) + k(x, X) (K + g I)^-1 (y - f0(X) - e),    e ~ N(0, s^2 g I)                            (3)
 """
@@ -78,7 +78,7 @@ class GaussianProcess:
 def log_likelihood(x: FloatArray, y: FloatArray, hyper: Hyper) -> float:
     """Marginal likelihood (2) with the signal variance at its optimum, up to a constant."""
     factor = _factor(x, hyper)
-    variance = _signal_variance(np.linalg.solve(factor, y))
+    variance = _signal_variance(np.asarray(np.linalg.solve(factor, y), dtype=np.float64))
     return float(-0.5 * len(x) * np.log(variance) - np.log(np.diag(factor)).sum())
 
 
