@@ -129,7 +129,7 @@ static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_
     const ivl_sim_world_t *world = &group->world[lane];
     const ivl_sim_params_t *raw = &world->model->raw;
     const double slack = 1.0e-9;
-    if (!(fabs(group->state.p_WB_m.z[lane]) < 1.0e6 && fabs(group->state.w_B_radps.y[lane]) < 1.0e6))
+    if (ivl_sim_world_diverged(&group->state, lane))
     {
         *end = IVL_SIM_END_NOT_FINITE;
         return true;

@@ -383,6 +383,12 @@ static bool judge(ivl_sim_group_t *group, int lane)
     return true;
 }
 
+bool ivl_sim_world_diverged(const ivl_sim_state_t *s, int lane)
+{
+    const double rate_radps = fabs(s->w_B_radps.x[lane]) + fabs(s->w_B_radps.y[lane]) + fabs(s->w_B_radps.z[lane]);
+    return !(rate_radps < 1.0e6 && fabs(s->p_WB_m.z[lane]) < 1.0e6);
+}
+
 static void accept(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t *w = &group->world[lane];
@@ -395,6 +401,10 @@ static void accept(ivl_sim_group_t *group, int lane)
     w->t_s += w->trial.dt_s;
     w->left_s -= w->trial.dt_s;
     w->n_step++;
+    if (ivl_sim_world_diverged(&group->next, lane))
+    {
+        w->left_s = 0.0; // steps towards its contacts would shrink for ever: the tick ends here, and with it the landing
+    }
     const double d = w->model->raw.world_ceiling_height_m - group->next.p_WB_m.z[lane];
     w->d_min_m = (d < w->d_min_m) ? d : w->d_min_m;
     grade_step(w, false);

@@ -97,6 +97,9 @@ void ivl_sim_group_step(ivl_sim_group_t *group);
 /// Motion alone, for dt, with the rotor commands as they are; of all active worlds.
 void ivl_sim_group_advance(ivl_sim_group_t *group, double dt_s);
 
+/// True for a motion that is no longer one: not finite, or faster than anything that flies.
+bool ivl_sim_world_diverged(const ivl_sim_state_t *state, int lane);
+
 int ivl_sim_world_count_stuck(const ivl_sim_world_t *world);
 
 #endif // IVL_SIM_WORLD_H
