@@ -11,6 +11,7 @@ static const double NEAR_MARGIN_M = 0.05; // more than a vehicle moves in one st
 static const double FAR_M = 1.0;      // stands for the gap of what cannot make an event
 static const double NO_EVENT = 2.0;   // share of a step, beyond its end
 static const double TIME_SLACK_S = 1.0e-9;
+static const double TURNS_MAX = 16.0; // what the limit on a step's turn can shorten it by
 
 // ---- starting -----------------------------------------------------------------------------------------------------------
 
@@ -213,10 +214,25 @@ static void stop_held_feet(ivl_sim_group_t *group, int lane)
     ivl_sim_lane_set(&group->state, lane, &kin);
 }
 
-static void grade_step(ivl_sim_world_t *w, bool event)
+/// Four stuck feet hold the body redundantly, and near the posture in which the lines of the legs meet in one point it can
+/// turn a little all the same: there a step must not turn it far, or the truss pumps energy.
+static double longest_step(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
-    const double most = (w->impact.happened ? raw->step_swing_s : raw->step_flight_s) * raw->step_scale_norm;
+    const double most = w->impact.happened ? raw->step_swing_s : raw->step_flight_s;
+    if (ivl_sim_world_count_stuck(w) < IVL_SIM_LEGS)
+    {
+        return most;
+    }
+    const ivl_d3_t rate = ivl_d3(s->w_B_radps.x[lane], s->w_B_radps.y[lane], s->w_B_radps.z[lane]);
+    const double turns = most * sqrt(ivl_d3_dot(rate, rate)) / raw->step_turn_rad;
+    return (turns > 1.0) ? most / ((turns < TURNS_MAX) ? turns : TURNS_MAX) : most;
+}
+
+static void grade_step(ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, bool event)
+{
+    const ivl_sim_params_t *raw = &w->model->raw;
+    const double most = longest_step(w, s, lane) * raw->step_scale_norm;
     const double next = event ? raw->step_touch_s * raw->step_scale_norm : w->step_s * raw->step_growth_norm;
     w->step_s = (next < most) ? next : most;
 }
@@ -255,7 +271,7 @@ static void handle_touches(ivl_sim_group_t *group, int lane, const double gap[IV
     }
     if (event)
     {
-        grade_step(w, true);
+        grade_step(w, &group->state, lane, true);
     }
 }
 
@@ -289,7 +305,7 @@ static bool handle_held(ivl_sim_group_t *group, int lane)
     }
     if (event)
     {
-        grade_step(w, true);
+        grade_step(w, &group->state, lane, true);
     }
     return event;
 }
@@ -407,7 +423,7 @@ static void accept(ivl_sim_group_t *group, int lane)
     }
     const double d = w->model->raw.world_ceiling_height_m - group->next.p_WB_m.z[lane];
     w->d_min_m = (d < w->d_min_m) ? d : w->d_min_m;
-    grade_step(w, false);
+    grade_step(w, &group->next, lane, false);
 }
 
 /// One lane of a struct that is made of wide numbers only.
