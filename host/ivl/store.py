@@ -13,6 +13,7 @@ bit. SQLite stores float64 exactly, but for the sign of a zero; NaN is stored as
 
 import fcntl
 import json
+import math
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
@@ -60,7 +61,7 @@ class RolloutRows:
         status: "planned", "scored" or "discarded", shape (n,).
         theta: Policies, shape (n, 2).
         reward: Return, shape (n,), NaN if not scored.
-        outcomes: Outcome records, shape (n,); zero if not scored.
+        outcomes: Outcome records, shape (n,); NaN and zero if not flown.
     """
 
     trial: npt.NDArray[np.int64]
@@ -212,10 +213,11 @@ class RunStore:
             f"WHERE trial=? AND episode=? AND idx=? AND status='{PLANNED}'"
         )
         status = DISCARDED if discarded else SCORED
-        terms = np.stack([reward.total, reward.distance, reward.angle, reward.legs], axis=1)
+        columns = [term.tolist() for term in (reward.total, reward.distance, reward.angle, reward.legs)]
+        columns += self._flatten(outcomes)
         rows = [
-            (status, discarded, *map(_to_sql, terms[i].tolist()), *self._flatten(outcomes[i]), *key)
-            for i, key in enumerate(keys)
+            (status, discarded, *map(_to_sql, values), *key)
+            for values, key in zip(zip(*columns, strict=True), keys, strict=True)
         ]
         with self._transaction():
             changed = self._db.executemany(update, rows).rowcount
@@ -257,11 +259,7 @@ class RunStore:
         return self._rollout_rows(rows, len(names))
 
     def _rollout_rows(self, rows: list[tuple[Any, ...]], n_names: int) -> RolloutRows:
-        outcomes = np.zeros(len(rows), dtype=self._outcome_dtype)
-        for i, row in enumerate(rows):
-            if row[4] != PLANNED:
-                self._unflatten(row[n_names:], outcomes[i : i + 1])
-        column = list(zip(*rows, strict=True)) or [()] * n_names
+        column = list(zip(*rows, strict=True)) or [()] * (n_names + len(self._outcome_columns))
         return RolloutRows(
             trial=np.array(column[0], dtype=np.int64),
             episode=np.array(column[1], dtype=np.int64),
@@ -270,7 +268,7 @@ class RunStore:
             status=np.array(column[4], dtype=np.str_),
             theta=np.array([column[5], column[6]], dtype=np.float64).T.copy(),
             reward=np.array([_from_sql(x) for x in column[7]], dtype=np.float64),
-            outcomes=outcomes.view(np.recarray),
+            outcomes=self._unflatten(column[n_names:], len(rows)),
         )
 
     def _create_tables(self) -> None:
@@ -293,20 +291,26 @@ class RunStore:
         rows = [(trial, json.dumps(state, allow_nan=False)) for trial, state in zip(trials, states, strict=True)]
         self._db.executemany("INSERT OR REPLACE INTO learner(trial, state) VALUES(?,?)", rows)
 
-    def _flatten(self, outcome: Any) -> list[Any]:
-        values: list[Any] = []
+    def _flatten(self, outcomes: Outcomes) -> list[list[Any]]:
+        """One list for each column of `_outcome_columns`."""
+        columns: list[list[Any]] = []
         for name in self._outcome_dtype.names or ():
-            item = outcome[name].tolist()
-            values.extend(item if isinstance(item, list) else [item])
-        return [_to_sql(value) for value in values]
+            columns.extend(outcomes[name].reshape(len(outcomes), self._width(name)).T.tolist())
+        return columns
 
-    def _unflatten(self, values: Sequence[Any], target: npt.NDArray[np.void]) -> None:
-        at = 0
+    def _unflatten(self, columns: Sequence[Sequence[Any]], n: int) -> Outcomes:
+        """Inverse of `_flatten`; NULL is NaN, and zero in the integers of a rollout that was not flown."""
+        outcomes, at = np.zeros(n, dtype=self._outcome_dtype), 0
         for name in self._outcome_dtype.names or ():
-            count = int(np.prod(self._outcome_dtype[name].shape, dtype=np.int64))
-            part = [_from_sql(value) for value in values[at : at + count]]
-            target[name][0] = part if self._outcome_dtype[name].shape else part[0]
-            at += count
+            target = outcomes[name].reshape(n, self._width(name))
+            nothing = np.nan if target.dtype.kind == "f" else 0
+            for i in range(target.shape[1]):
+                target[:, i] = [nothing if value is None else value for value in columns[at + i]]
+            at += target.shape[1]
+        return outcomes.view(np.recarray)
+
+    def _width(self, name: str) -> int:
+        return math.prod(self._outcome_dtype[name].shape)
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
@@ -348,7 +352,7 @@ def _outcome_columns(dtype: np.dtype[np.void]) -> dict[str, str]:
     for name in dtype.names or ():
         field = dtype[name]
         kind = "REAL" if field.base.kind == "f" else "INTEGER"
-        count = int(np.prod(field.shape, dtype=np.int64))
+        count = math.prod(field.shape)
         names = [f"out_{name}"] if not field.shape else [f"out_{name}_{i + 1}" for i in range(count)]
         columns.update(dict.fromkeys(names, kind))
     return columns

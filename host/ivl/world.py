@@ -215,7 +215,7 @@ class World:
             )
 
 
-def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
+def _numbers(name: str, value: npt.ArrayLike | None) -> npt.NDArray[Any]:
     """The argument as a float64 array, seeds and streams as uint64."""
     array = np.asarray(value)
     if array.dtype.kind not in "iuf" or array.dtype == np.longdouble:
