@@ -31,8 +31,13 @@ typedef struct
 } ivl_out_t;
 
 /// Start from IDLE with nothing remembered.  A bad configuration keeps the core in IDLE for ever.
-/// The configuration must not change afterwards without another ivl_init.
+/// The configuration must not change afterwards without another ivl_init or ivl_reconfigure.
 void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state);
+
+/// Put another configuration in force, in IDLE only.  As ivl_init, but the lock-out of other controllers, and the demand for a HOVER after a
+/// landing, stay.
+/// @return IVL_OK; or, with nothing changed, IVL_ERR_RANGE or IVL_ERR_PHASE
+ivl_status_t ivl_reconfigure(ivl_cfg_t *cfg, ivl_state_t *state, const ivl_cfg_t *wanted);
 
 /// One tick: sensed state -> ceiling -> cues -> phase (with the trigger) -> maneuver or controller -> mixer -> PWM.
 void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out);

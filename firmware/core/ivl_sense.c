@@ -18,7 +18,7 @@ void ivl_sense_reset(ivl_sense_t *sense)
     sense->t_last_us = UINT64_MAX;
 }
 
-static bool command_good(const ivl_cfg_t *cfg, const ivl_command_t *cmd)
+bool ivl_sense_command_good(const ivl_cfg_t *cfg, const ivl_command_t *cmd)
 {
     switch (cmd->request)
     {
@@ -78,7 +78,7 @@ void ivl_sense_update(const ivl_cfg_t *cfg, ivl_sense_t *sense, const ivl_in_t *
     const float      q_norm2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
     const float      age_s = pose_age_s(cfg, sense, in);
     sense->pose_fresh = (age_s >= 0.0f) && pose_good(in, q_norm2);
-    sense->cmd_fresh = command_good(cfg, &in->cmd);
+    sense->cmd_fresh = ivl_sense_command_good(cfg, &in->cmd);
 
     // what is good is taken, what is not lets its predecessor age
     if (sense->pose_fresh)

@@ -42,6 +42,9 @@ typedef struct
 /// No sample, request IDLE.
 void ivl_sense_reset(ivl_sense_t *sense);
 
+/// True if a command makes sense: a request that exists, and the arguments that it uses within their ranges.
+bool ivl_sense_command_good(const ivl_cfg_t *cfg, const ivl_command_t *cmd);
+
 /// Take in one tick.  State and command are independent: an abort arrives even if the sensed state is bad, and the vehicle is kept
 /// level even if the command is.
 /// @param[in] dt_s  tick period, s

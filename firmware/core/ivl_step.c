@@ -22,6 +22,24 @@ void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state)
     }
 }
 
+ivl_status_t ivl_reconfigure(ivl_cfg_t *cfg, ivl_state_t *state, const ivl_cfg_t *wanted)
+{
+    if (state->phase != IVL_PHASE_IDLE)
+    {
+        return IVL_ERR_PHASE;
+    }
+    const ivl_status_t status = ivl_cfg_check(wanted);
+    if (status == IVL_OK)
+    {
+        const bool locked_out = state->guard.locked_out, triggered = state->triggered;
+        *cfg = *wanted;
+        ivl_init(cfg, state);
+        state->guard.locked_out = locked_out;
+        state->triggered = triggered;
+    }
+    return status;
+}
+
 static void count_faults(ivl_diag_t *diag, const ivl_sense_t *sense)
 {
     diag->n_bad_pose += sense->pose_fresh ? 0u : 1u;

@@ -156,6 +156,32 @@ static void test_core_stays_idle_for_ever_when_the_configuration_is_bad(void)
     }
 }
 
+static void test_rows_have_the_names_and_the_order_of_the_table(void)
+{
+    ivl_cfg_t cfg;
+    ivl_cfg_defaults(&cfg);
+    TEST_ASSERT_EQUAL_INT(-1, ivl_cfg_bad_row(&cfg));
+    TEST_ASSERT_EQUAL_STRING("mass", ivl_cfg_name(0));
+    TEST_ASSERT_EQUAL_STRING("jxx", ivl_cfg_name(1));
+    TEST_ASSERT_NULL(ivl_cfg_name(-1));
+    TEST_ASSERT_NULL(ivl_cfg_name(1000));
+    cfg.jxx_kgm2 = NAN;
+    TEST_ASSERT_EQUAL_INT(1, ivl_cfg_bad_row(&cfg));
+}
+
+static void test_crc_changes_with_every_parameter(void)
+{
+    ivl_cfg_t cfg;
+    ivl_cfg_defaults(&cfg);
+    const uint32_t crc = ivl_cfg_crc(&cfg);
+    TEST_ASSERT_EQUAL_HEX32(crc, ivl_cfg_crc(&cfg));
+#define CHANGE(ctype, group, name, field, unit, min, max, dflt, doc)                                                                       \
+    cfg.field = (ctype)(cfg.field + (ctype)1);                                                                                             \
+    TEST_ASSERT_TRUE_MESSAGE(ivl_cfg_crc(&cfg) != crc, name);                                                                              \
+    cfg.field = (ctype)(dflt);
+    IVL_PARAMS(CHANGE)
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -166,5 +192,7 @@ int main(void)
     RUN_TEST(test_table_rows_are_named_for_the_link);
     RUN_TEST(test_log_rows_are_named_for_the_link_and_differ_from_parameters);
     RUN_TEST(test_core_stays_idle_for_ever_when_the_configuration_is_bad);
+    RUN_TEST(test_rows_have_the_names_and_the_order_of_the_table);
+    RUN_TEST(test_crc_changes_with_every_parameter);
     return UNITY_END();
 }

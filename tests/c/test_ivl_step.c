@@ -290,6 +290,33 @@ static void test_same_inputs_give_the_same_bits(void)
     }
 }
 
+static void test_reconfigure_takes_a_good_configuration_in_idle_only(void)
+{
+    fix_to_phase(&fix, IVL_PHASE_READY);
+    ivl_cfg_t wanted = fix.cfg;
+    wanted.h_ceil_m = 3.0f;
+    TEST_ASSERT_EQUAL_INT(IVL_ERR_PHASE, ivl_reconfigure(&fix.cfg, &fix.state, &wanted));
+    fix_request(&fix, IVL_REQUEST_IDLE);
+    wanted.mass_kg = NAN;
+    TEST_ASSERT_EQUAL_INT(IVL_ERR_RANGE, ivl_reconfigure(&fix.cfg, &fix.state, &wanted));
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 2.1f, fix.cfg.h_ceil_m);
+    wanted.mass_kg = 0.04f;
+    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_reconfigure(&fix.cfg, &fix.state, &wanted));
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 3.0f, fix.cfg.h_ceil_m);
+    TEST_ASSERT_FALSE(fix.state.has_policy);
+}
+
+static void test_reconfigure_keeps_the_lock_out_and_the_demand_for_hover(void)
+{
+    fix_to_phase(&fix, IVL_PHASE_DONE);
+    fix_request(&fix, IVL_REQUEST_IDLE);
+    const ivl_cfg_t wanted = fix.cfg;
+    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_reconfigure(&fix.cfg, &fix.state, &wanted));
+    fix_tick(&fix);
+    TEST_ASSERT_FALSE(fix.out.stock_allowed);
+    TEST_ASSERT_TRUE(fix.state.triggered);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -300,5 +327,7 @@ int main(void)
     RUN_TEST(test_output_of_a_tick_is_consistent);
     RUN_TEST(test_counters_count_ticks_and_refused_inputs);
     RUN_TEST(test_same_inputs_give_the_same_bits);
+    RUN_TEST(test_reconfigure_takes_a_good_configuration_in_idle_only);
+    RUN_TEST(test_reconfigure_keeps_the_lock_out_and_the_demand_for_hover);
     return UNITY_END();
 }
