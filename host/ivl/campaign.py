@@ -26,7 +26,7 @@ from ivl.source import WorldSource
 from ivl.store import DISCARDED, SCHEMA_VERSION, SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest, write_json
 from ivl.world import World
 
-_MUST_MATCH = ("trials", "config_sha256", "model_sha256", "library_sha256")
+_MUST_MATCH = ("trials", "uri", "config_sha256", "model_sha256", "library_sha256")
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def run(
     """
     hooks = hooks or Hooks()
     world = chosen.make_world()
-    manifest = make_manifest(chosen, world, n_trials)
+    manifest = make_manifest(chosen, world, n_trials, uri)
     source = links.open_source(uri, chosen, threads) if uri else WorldSource(world, chosen, threads)
     with _open(folder, chosen, manifest, resume) as store:
         if hooks.on_start:
@@ -141,7 +141,9 @@ def default_folder(chosen: Experiment, n_trials: int | None, resume: bool) -> Pa
     return existing
 
 
-def make_manifest(chosen: Experiment, world: World, n_trials: int | None) -> dict[str, Any]:
+def make_manifest(
+    chosen: Experiment, world: World, n_trials: int | None = None, uri: str | None = None
+) -> dict[str, Any]:
     """What identifies a run: hashes, versions, seed and units."""
     library = native.library()
     return {
@@ -149,6 +151,7 @@ def make_manifest(chosen: Experiment, world: World, n_trials: int | None) -> dic
         "experiment": chosen.name,
         "seed": chosen.seed,
         "trials": n_trials,
+        "uri": uri,
         "config_sha256": hashlib.sha256(chosen.to_yaml().encode()).hexdigest(),
         "model_sha256": world.params.digest(),
         "library_sha256": library.digest(),
@@ -180,8 +183,8 @@ def _open(folder: Path, chosen: Experiment, manifest: dict[str, Any], resume: bo
 
 def _difference(folder: Path, key: str, old: dict[str, Any], new: dict[str, Any], chosen: Experiment) -> str:
     """Which thing is not as it was when the run began."""
-    if key == "trials":
-        return f"trials: it has {old.get(key)}, now {new[key]}"
+    if key in ("trials", "uri"):
+        return f"{key}: it has {old.get(key)}, now {new[key]}"
     if key == "config_sha256":
         then, now = yamlfile.read(folder / "config.yaml"), yamlfile.parse(chosen.to_yaml(), "experiment")
         for field in now:

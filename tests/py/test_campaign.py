@@ -108,6 +108,14 @@ def test_a_run_whose_world_changed_is_not_resumed(small: Experiment, tmp_path: P
         campaign.run(small, tmp_path / "run", resume=True)
 
 
+def test_a_run_flown_elsewhere_is_not_continued_in_the_simulator(small: Experiment, tmp_path: Path) -> None:
+    campaign.run(small, tmp_path / "run")
+    path = tmp_path / "run" / "manifest.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "uri": "radio://0"}))
+    with pytest.raises(StoreError, match="uri: it has radio://0, now None"):
+        campaign.run(small, tmp_path / "run", resume=True)
+
+
 def test_a_run_is_not_overwritten(small: Experiment, tmp_path: Path) -> None:
     campaign.run(small, tmp_path / "run")
     with pytest.raises(StoreError, match="holds a run already"):

@@ -312,6 +312,11 @@ def test_help_lists_the_commands(capsys: Capture) -> None:
     assert all(command in text for command in ("learn", "rollout", "list", "bench"))
 
 
+def test_without_a_command_the_help_is_shown_and_nothing_succeeds(capsys: Capture) -> None:
+    assert cli.run([]) == 2
+    assert "learn" in capsys.readouterr().out
+
+
 def test_an_unknown_command_is_refused(capsys: Capture) -> None:
     assert "flie" in refused(["flie"], capsys)
 

@@ -13,7 +13,6 @@ from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
 app = typer.Typer(
     name="ivl",
     help="Inverted landing: learn to land a small multicopter on a ceiling.",
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -26,8 +25,12 @@ app.command("bench", help=bench.HELP)(bench.bench)
 
 def run(arguments: list[str] | None = None) -> int:
     """Run one command and return its exit code; errors are one line on stderr."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if not arguments:
+        app(["--help"], standalone_mode=False, prog_name="ivl")
+        return 2
     try:
-        result = app(arguments, standalone_mode=False)
+        result = app(arguments, standalone_mode=False, prog_name="ivl")
         return int(result or 0)
     except (ConfigError, ArgumentError, LearnerError) as error:
         return _fail(str(error), 2)

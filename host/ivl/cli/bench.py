@@ -15,15 +15,16 @@ from ivl.cli import console
 from ivl.errors import IvlError
 from ivl.world import World
 
-HELP = """Measure the simulator's speed on one core, and its ratio to the same landing in MuJoCo.
+HELP = """Measure the simulator on one core, and against MuJoCo.
 
+\b
 Examples:
-
-  ivl bench                    rollouts and physics steps per second, ratio to MuJoCo
-
-  ivl bench --json             for a script
-
-  ivl bench --no-mujoco        without the comparison
+  ivl bench
+      rollouts and physics steps per second, ratio to the same landing in MuJoCo
+  ivl bench --json
+      for a script
+  ivl bench --no-mujoco
+      without the comparison
 """
 _MUJOCO_BENCH = Path(__file__).parents[3] / "tests" / "mujoco" / "bench.py"
 

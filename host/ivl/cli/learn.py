@@ -15,24 +15,25 @@ HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
 EXPERIMENT is a YAML file; a name such as experiments/paper_vertical.yaml is also found inside the package.
 Everything lands in a run folder: resolved config, every rollout (run.sqlite), result.json and pictures.
 
+\b
 Examples:
-
-  ivl learn experiments/paper_vertical.yaml                     the paper's vertical landing
-
-  ivl learn experiments/paper_vertical.yaml --learner ephe      another learner (see: ivl list learners)
-
+  ivl learn experiments/paper_vertical.yaml
+      the paper's vertical landing
+  ivl learn experiments/paper_vertical.yaml --learner ephe
+      another learner (see: ivl list learners)
   ivl learn experiments/paper_vertical.yaml --set gear_set=table1 --set sense.latency=0.02
-
-  ivl learn experiments/paper_vertical.yaml --trials 100 --json   how often and how fast, over 100 seeds
-
-  ivl learn experiments/paper_vertical.yaml --uri pil://        every tick decided by an emulated STM32
-
-  ivl learn --resume --out runs/mine                            go on after Ctrl-C, kill -9 or power loss
+      another landing gear, slower sensing
+  ivl learn experiments/paper_vertical.yaml --trials 100 --json
+      how often and how fast, over 100 seeds, for a script
+  ivl learn experiments/paper_vertical.yaml --uri pil://
+      every tick decided by an emulated STM32
+  ivl learn --resume --out runs/mine
+      go on after Ctrl-C, kill -9 or power loss
 """
 
 
 def learn(
-    path: Annotated[str | None, typer.Argument(metavar="[EXPERIMENT]", help="YAML file of the experiment.")] = None,
+    path: Annotated[str | None, typer.Argument(metavar="EXPERIMENT", help="YAML file of the experiment.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of learner and world.", min=0)] = None,
     trials: Annotated[
         int | None, typer.Option(help="Run this many seeds in lock-step: seed, seed + 1, ...", min=1, max=100_000)
@@ -59,7 +60,9 @@ def learn(
         result = campaign.run(chosen, folder, n_trials, resume, threads, hooks, uri)
     except KeyboardInterrupt:
         console.err.print(
-            f"interrupted; continue with: ivl learn --resume --out {folder}", highlight=False, soft_wrap=True
+            f"interrupted; continue with: ivl learn --resume --out {folder}{f' --uri {uri}' if uri else ''}",
+            highlight=False,
+            soft_wrap=True,
         )
         raise
     pictures = _draw(result) if n_trials is None else []

@@ -12,11 +12,12 @@ from ivl.reward import REWARDS
 
 HELP = """List what there is to choose from.
 
+\b
 Examples:
-
-  ivl list                     everything
-
-  ivl list gears --json        the landing gears, for a script
+  ivl list
+      everything
+  ivl list gears --json
+      the landing gears, for a script
 """
 
 

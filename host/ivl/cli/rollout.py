@@ -16,15 +16,16 @@ from ivl.world import Trace, World
 
 HELP = """Fly one landing and print its outcome.
 
+\b
 Examples:
-
   ivl rollout --gear wide_short --speed 2.5 --angle 90 --rrev 4.8 --moment 8
-
+      the outcome, field by field
   ivl rollout --gear wide_long --gear-set as_simulated --speed 3 --angle 60 --rrev 4 --moment 7 --plot landing.png
-
+      a strobe picture
   ivl rollout --speed 2.5 --angle 90 --rrev 4.8 --moment 8 --trace landing.csv --json
-
+      the whole time series, and the outcome for a script
   ivl rollout --vehicle crazyflie21 --speed 2.5 --angle 90 --rrev 6 --moment 8 --set sense.latency=0.02
+      another vehicle, slower sensing
 """
 _TRACE_PERIOD_S = 0.001
 
