@@ -75,7 +75,7 @@
     X(end, time_max, s, "s", 0.1, 60.0, 5.0, "or this long after its start") \
     X(step, flight, s, "s", 1.0e-6, 0.002, 0.002, "largest integration step before the first contact") \
     X(step, touch, s, "s", 1.0e-6, 0.002, 0.0005, "integration step right after a contact event") \
-    X(step, plate, s, "s", 1.0e-6, 0.001, 0.00025, "largest integration step while a plate presses on the ceiling") \
+    X(step, plate, s, "s", 1.0e-6, 0.0005, 0.0001, "largest integration step while a plate presses on the ceiling") \
     X(step, swing, s, "s", 1.0e-6, 0.004, 0.002, "largest integration step after the first contact") \
     X(step, turn, rad, "rad", 1.0e-4, 1.0, 0.01, "largest turn of the body in one step while four feet are stuck") \
     X(step, growth, norm, "1", 1.0, 2.0, 1.1, "factor by which the step grows from one to the next") \
