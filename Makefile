@@ -1,6 +1,6 @@
 # The front door.  `make` lists the targets.
 #
-# This file decides what is set up and in which order; tools/native.mk compiles the C code.
+# This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
 # Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS.
 
 PYTHON     ?= python3
@@ -17,8 +17,11 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 UNITY  := build/unity
 GOLDEN := O0 release clang-O0 clang
+STM32  := stm32-Os stm32-O2 stm32-clang
 # a -j given by the user is passed on; without one the C code is compiled on all cores
-NATIVE  = $(MAKE) --no-print-directory -f tools/native.mk $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS)) -Otarget
+SUBMAKE = $(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS)) -Otarget
+NATIVE  = $(SUBMAKE) -f tools/native.mk
+CROSS   = $(SUBMAKE) -f tools/stm32.mk
 say     = @printf '==> %s\n'
 pip     = $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint tools/constraints.txt
 
@@ -45,10 +48,57 @@ learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for ano
 	$(say) 'learn: $(EXPERIMENT)'
 	@$(BIN)/ivl learn $(EXPERIMENT)
 
+##@ The vehicle's processor
+
+.PHONY: firmware
+firmware: $(STM32:%=firmware-%) ## compile the flight core for the STM32F405 and print its size
+	@+$(CROSS) FLAVOUR=stm32-Os install
+	$(say) 'firmware: flight core, bytes of flash'
+	@for flavour in $(STM32); do \
+	    printf '  %-12s ' $$flavour; arm-none-eabi-size --totals build/$$flavour/firmware/core/*.o | awk 'END {print $$1}'; done
+
+.PHONY: $(STM32:%=firmware-%)
+$(STM32:%=firmware-%): firmware-%: cross-toolchain
+	$(say) 'firmware: compiling $*'
+	@+$(CROSS) FLAVOUR=$* programs
+
+.PHONY: pil
+pil: setup-dev build firmware $(STM32:%=pil-unity-%) ## unit tests, replay and landings on an emulated STM32F405
+	@+$(CROSS) layout
+	$(say) 'pil: pytest tests/stm32'
+	@$(BIN)/python -m pytest tests/stm32 $(PYTEST_ARGS)
+
+.PHONY: $(STM32:%=pil-unity-%)
+$(STM32:%=pil-unity-%): pil-unity-%: cross-toolchain $(UNITY)/unity.c
+	$(say) 'pil: C tests on the emulated chip ($*)'
+	@+$(CROSS) FLAVOUR=$* check
+
+.PHONY: pil-long
+pil-long: setup-dev build firmware $(UNITY)/unity.c ## a million recorded ticks of each build compared, ten million fuzzed (2 min)
+	$(say) 'pil-long: replay'
+	@$(BIN)/python tools/stm32/replay.py --ticks 1000000 $(STM32:%=build/%/replay.elf)
+	$(say) 'pil-long: fuzz'
+	@+$(CROSS) fuzz
+
+.PHONY: sizes
+sizes: setup-dev build firmware ## flash, memory, stack, instructions and cycles of a tick
+	$(say) 'sizes: figures and budgets'
+	@$(BIN)/python tools/stm32/budget.py $(STM32:%=build/%)
+
+.PHONY: sizes-diff
+sizes-diff: setup-dev build firmware ## the same against the accepted figures; fails on growth beyond a margin
+	$(say) 'sizes-diff: figures, budgets and tools/stm32/baseline.json'
+	@$(BIN)/python tools/stm32/budget.py --diff $(STM32:%=build/%)
+
+.PHONY: sizes-update
+sizes-update: setup-dev build firmware ## accept the present figures (in a commit that says why)
+	$(say) 'sizes-update: tools/stm32/baseline.json'
+	@$(BIN)/python tools/stm32/budget.py --update $(STM32:%=build/%)
+
 ##@ Tests
 
 .PHONY: test
-test: lint test-c san golden test-py test-mujoco ## everything below, set-up and compilers included
+test: lint test-c san golden test-py test-mujoco pil sizes-diff ## everything below, set-up and compilers included
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
@@ -123,17 +173,23 @@ setup-dev: $(VENV)/.stamp-dev ## add what tests and lint need to .venv
 toolchain: ## install the compilers that the tests need (Debian; needs root only if one is missing)
 	@tools/apt_install.sh $(firstword $(CC)):gcc nm:binutils $(CLANG):clang-14
 
+.PHONY: cross-toolchain
+cross-toolchain: ## install what compiles for the vehicle and emulates it (Debian; needs root only if something is missing)
+	@tools/apt_install.sh arm-none-eabi-gcc:gcc-arm-none-eabi \
+	    $$(echo '#include <string.h>' | arm-none-eabi-gcc -E -x c - > /dev/null 2>&1 || echo :libnewlib-arm-none-eabi) \
+	    qemu-system-arm:qemu-system-arm $(CLANG):clang-14
+
 .PHONY: clean
 clean: ## remove what was compiled
 	$(say) 'clean: build/, native library, caches'
-	@rm -rf build host/ivl/_native/*.so .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	@rm -rf build host/ivl/_native/*.so host/ivl/_native/*.elf .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 .PHONY: distclean
 distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] sim_sil/*.[ch] tests/c/*.[ch])
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_pil/*.[ch] tests/c/*.[ch] tests/stm32/*.c)
 
 # set-up, each step once
 
@@ -148,7 +204,7 @@ $(VENV)/.stamp-run: $(BIN)/python pyproject.toml tools/constraints.txt
 
 $(VENV)/.stamp-dev: $(VENV)/.stamp-run
 	$(say) 'setup: installing what tests and lint need'
-	@$(pip) --editable '.[test,mujoco,lint]'
+	@$(pip) --editable '.[test,mujoco,lint,stm32]'
 	@touch $@
 
 $(UNITY)/unity.c: tools/get_unity.sh tools/unity.txt | $(BIN)/python

@@ -1,4 +1,4 @@
-#define _GNU_SOURCE // pipe2
+#define _GNU_SOURCE  // pipe2
 #include "pil.h"
 
 #include <errno.h>
@@ -19,9 +19,9 @@
 
 enum
 {
-    ANSWER_MS = 10000, // a tick takes 0.02 ms, the start of the emulator 40 ms
+    ANSWER_MS = 10000,  // a tick takes 0.02 ms, the start of the emulator 40 ms
     ERROR_SIZE = 256,
-    ENDS_MS = 2000, // patience with a chip whose input was closed
+    ENDS_MS = 2000,  // patience with a chip whose input was closed
 };
 
 _Static_assert(IVL_PORT_SLOTS >= 8, "a slot for each lane of a group of worlds");
@@ -30,21 +30,21 @@ typedef struct pool pool_t;
 
 typedef struct chip
 {
-    pool_t *pool;
+    pool_t      *pool;
     struct chip *next;
-    pid_t pid;
-    int to, from; ///< pipes; -1 once the chip has failed
-    bool busy;
-    uint32_t n_request[IVL_PORT_SLOTS]; ///< since the slot's INIT
-    uint64_t n_tick;
+    pid_t        pid;
+    int          to, from;  ///< pipes; -1 once the chip has failed
+    bool         busy;
+    uint32_t     n_request[IVL_PORT_SLOTS];  ///< since the slot's INIT
+    uint64_t     n_tick;
 } chip_t;
 
 struct pool
 {
-    char **command;
-    pthread_mutex_t lock; ///< of chips and error
-    chip_t *chips;
-    char error[ERROR_SIZE];
+    char               **command;
+    pthread_mutex_t      lock;  ///< of chips and error
+    chip_t              *chips;
+    char                 error[ERROR_SIZE];
     atomic_uint_fast64_t n_tick;
 };
 
@@ -144,7 +144,7 @@ static bool receive_all(chip_t *chip, void *bytes, size_t size)
     while (size > 0)
     {
         struct pollfd ready = {.fd = chip->from, .events = POLLIN};
-        const int n_ready = poll(&ready, 1, ANSWER_MS);
+        const int     n_ready = poll(&ready, 1, ANSWER_MS);
         if (n_ready < 0 && errno == EINTR)
         {
             continue;
@@ -166,7 +166,7 @@ static bool receive_all(chip_t *chip, void *bytes, size_t size)
 static int spawn(char *const command[], int in, int out, pid_t *pid)
 {
     posix_spawn_file_actions_t files;
-    posix_spawnattr_t how;
+    posix_spawnattr_t          how;
     posix_spawn_file_actions_init(&files);
     posix_spawnattr_init(&how);
     posix_spawn_file_actions_adddup2(&files, in, STDIN_FILENO);
@@ -181,9 +181,8 @@ static int spawn(char *const command[], int in, int out, pid_t *pid)
 
 static bool same_hello(const ivl_port_hello_t *a, const ivl_port_hello_t *b)
 {
-    return a->magic == b->magic && a->n_slots == b->n_slots && a->request_size == b->request_size &&
-           a->reply_size == b->reply_size && a->cfg_size == b->cfg_size && a->state_size == b->state_size &&
-           a->in_size == b->in_size && a->out_size == b->out_size;
+    return a->magic == b->magic && a->n_slots == b->n_slots && a->request_size == b->request_size && a->reply_size == b->reply_size &&
+           a->cfg_size == b->cfg_size && a->state_size == b->state_size && a->in_size == b->in_size && a->out_size == b->out_size;
 }
 
 static void start_chip(chip_t *chip)
@@ -211,7 +210,7 @@ static void start_chip(chip_t *chip)
         close_pipes(chip);
         return;
     }
-    ivl_port_hello_t hello;
+    ivl_port_hello_t       hello;
     const ivl_port_hello_t mine = ivl_port_hello();
     if (receive_all(chip, &hello, sizeof hello) && !same_hello(&hello, &mine))
     {
@@ -277,8 +276,7 @@ static void close_port(void *port)
 /// @return false if the chip has failed
 static bool exchange(chip_t *chip, const ivl_port_request_t *request, ivl_port_reply_t *reply)
 {
-    if (chip == NULL || chip->to < 0 || !send_all(chip, request, sizeof *request) ||
-        !receive_all(chip, reply, sizeof *reply))
+    if (chip == NULL || chip->to < 0 || !send_all(chip, request, sizeof *request) || !receive_all(chip, reply, sizeof *reply))
     {
         return false;
     }
@@ -299,8 +297,8 @@ static void rest(ivl_state_t *state)
 
 static void init(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state)
 {
-    chip_t *chip = port;
-    ivl_port_reply_t reply;
+    chip_t                  *chip = port;
+    ivl_port_reply_t         reply;
     const ivl_port_request_t request = {.operation = IVL_PORT_INIT, .slot = (uint32_t)lane, .with.cfg = *cfg};
     if (chip != NULL)
     {
@@ -317,7 +315,7 @@ static void init(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state)
 static ivl_status_t commit(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy)
 {
     (void)cfg;
-    ivl_port_reply_t reply;
+    ivl_port_reply_t         reply;
     const ivl_port_request_t request = {.operation = IVL_PORT_COMMIT, .slot = (uint32_t)lane, .with.policy = *policy};
     if (exchange(port, &request, &reply))
     {
@@ -331,7 +329,7 @@ static ivl_status_t commit(void *port, int lane, const ivl_cfg_t *cfg, ivl_state
 static void step(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
 {
     (void)cfg;
-    ivl_port_reply_t reply;
+    ivl_port_reply_t         reply;
     const ivl_port_request_t request = {.operation = IVL_PORT_STEP, .slot = (uint32_t)lane, .with.in = *in};
     if (exchange(port, &request, &reply))
     {
@@ -359,7 +357,7 @@ static char **copy_command(const char *const command[])
         copy[i] = strdup(command[i]);
         if (copy[i] == NULL)
         {
-            return NULL; // a few bytes are lost, by a program that has no memory left
+            return NULL;  // a few bytes are lost, by a program that has no memory left
         }
     }
     return copy;
@@ -394,8 +392,8 @@ void *ivl_pil_create(const char *const command[], char *error, size_t error_size
 
 void ivl_pil_attach(void *pil, void *model)
 {
-    ((ivl_sim_model_t *)model)->core = (ivl_sim_core_t){
-        .context = pil, .open = open_port, .close = close_port, .init = init, .commit = commit, .step = step};
+    ((ivl_sim_model_t *)model)->core =
+        (ivl_sim_core_t){.context = pil, .open = open_port, .close = close_port, .init = init, .commit = commit, .step = step};
 }
 
 uint64_t ivl_pil_ticks(void *pil)
@@ -405,7 +403,7 @@ uint64_t ivl_pil_ticks(void *pil)
 
 uint32_t ivl_pil_chips(void *pil)
 {
-    pool_t *pool = pil;
+    pool_t  *pool = pil;
     uint32_t n = 0;
     pthread_mutex_lock(&pool->lock);
     for (const chip_t *chip = pool->chips; chip != NULL; chip = chip->next)

@@ -28,4 +28,4 @@ const char *ivl_pil_error(void *pil);
 /// Ends the chips.
 void ivl_pil_free(void *pil);
 
-#endif // IVL_PIL_H
+#endif  // IVL_PIL_H

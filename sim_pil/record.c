@@ -11,9 +11,9 @@
 
 enum
 {
-    LANES = 8, // of a group of worlds
+    LANES = 8,  // of a group of worlds
     FILE_BUFFER = 1 << 20,
-    N_FLOATS = 16 // p, v, q, w, f
+    N_FLOATS = 16  // p, v, q, w, f
 };
 
 _Static_assert((int)IVL_PORT_SLOTS >= (int)LANES, "a slot for each lane");
@@ -24,19 +24,19 @@ typedef struct
     uint32_t n_left;
     uint32_t kind;
     uint32_t field;
-    float value;
-    uint64_t t_us, t_pose_us; ///< when it began
+    float    value;
+    uint64_t t_us, t_pose_us;  ///< when it began
 } fault_t;
 
 typedef struct
 {
-    FILE *requests, *replies;
-    uint64_t random;
-    double fault_norm;
-    bool open, bad;
-    ivl_cfg_t cfg[LANES]; ///< as spoiled
-    fault_t fault[LANES];
-    uint32_t n_request[LANES];
+    FILE     *requests, *replies;
+    uint64_t  random;
+    double    fault_norm;
+    bool      open, bad;
+    ivl_cfg_t cfg[LANES];  ///< as spoiled
+    fault_t   fault[LANES];
+    uint32_t  n_request[LANES];
 } recorder_t;
 
 // ---- random numbers: splitmix64 -----------------------------------------------------------------------------------------
@@ -69,27 +69,27 @@ static float between(recorder_t *r, float lo, float hi)
 
 enum
 {
-    FAULT_NUMBER, ///< one number of the sensed state is replaced
+    FAULT_NUMBER,  ///< one number of the sensed state is replaced
     FAULT_POSE_STALE,
     FAULT_POSE_FUTURE,
     FAULT_CLOCK_STANDS,
     FAULT_CLOCK_BACK,
     FAULT_QUATERNION_ZERO,
-    FAULT_REQUEST_NONE, ///< no such request
+    FAULT_REQUEST_NONE,  ///< no such request
     FAULT_REQUEST_IDLE,
     FAULT_REQUEST_HOVER,
     FAULT_REQUEST_ABORT,
-    FAULT_REQUEST_BAD, ///< arguments that are no numbers
-    FAULT_TINY,        ///< velocities and rates are denormal, and good
-    FAULT_WILD,        ///< velocities and rates are high, and good: motors saturate
+    FAULT_REQUEST_BAD,  ///< arguments that are no numbers
+    FAULT_TINY,         ///< velocities and rates are denormal, and good
+    FAULT_WILD,         ///< velocities and rates are high, and good: motors saturate
     FAULT_UPSIDE_DOWN,
     FAULT_IMPACT,
     FAULT_HANGING,
     FAULT_COUNT
 };
 
-static const float NUMBERS[] = {NAN,      -NAN,     INFINITY, -INFINITY, FLT_MAX, -FLT_MAX, 1.0e9f,
-                                1.0e-42f, -1.0e-45f, FLT_MIN, -0.0f,     0.0f,    -49.9f,   199.9f};
+static const float NUMBERS[] = {NAN,      -NAN,      INFINITY, -INFINITY, FLT_MAX, -FLT_MAX, 1.0e9f,
+                                1.0e-42f, -1.0e-45f, FLT_MIN,  -0.0f,     0.0f,    -49.9f,   199.9f};
 
 static float *number_of(ivl_in_t *in, uint32_t i)
 {
@@ -187,8 +187,7 @@ static void spoil(recorder_t *r, const fault_t *fault, ivl_in_t *in)
 
 // ---- writing ------------------------------------------------------------------------------------------------------------
 
-static void write_down(recorder_t *r, const ivl_port_request_t *request, int32_t status, const ivl_state_t *state,
-                       const ivl_out_t *out)
+static void write_down(recorder_t *r, const ivl_port_request_t *request, int32_t status, const ivl_state_t *state, const ivl_out_t *out)
 {
     ivl_port_reply_t reply;
     memset(&reply, 0, sizeof reply);
@@ -230,9 +229,11 @@ static void close_port(void *port)
 
 static void init(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state)
 {
-    recorder_t *r = port;
+    recorder_t        *r = port;
     ivl_port_request_t request = new_request(IVL_PORT_INIT, lane);
-    request.with.cfg = *cfg;
+#define COPY(c_type, group, name, field, unit, lo, hi, dflt, doc) request.with.cfg.field = cfg->field;
+    IVL_PARAMS(COPY)  // not the padding, which is not defined
+#undef COPY
     if (chance(r, r->fault_norm))
     {
         request.with.cfg.mass_kg = NUMBERS[below(r, sizeof NUMBERS / sizeof NUMBERS[0])];
@@ -247,7 +248,7 @@ static void init(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state)
 static ivl_status_t commit(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy)
 {
     (void)cfg;
-    recorder_t *r = port;
+    recorder_t        *r = port;
     ivl_port_request_t request = new_request(IVL_PORT_COMMIT, lane);
     request.with.policy = *policy;
     const ivl_status_t status = ivl_policy_commit(&r->cfg[lane], state, policy);
@@ -269,8 +270,8 @@ static void commit_another(recorder_t *r, int lane, ivl_state_t *state)
 static void step(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
 {
     (void)cfg;
-    recorder_t *r = port;
-    fault_t *fault = &r->fault[lane];
+    recorder_t        *r = port;
+    fault_t           *fault = &r->fault[lane];
     ivl_port_request_t request = new_request(IVL_PORT_STEP, lane);
     request.with.in = *in;
     if (fault->n_left == 0u && chance(r, r->fault_norm))
@@ -331,19 +332,14 @@ void *ivl_record_create(const char *requests_path, const char *replies_path, dou
 
 void ivl_record_attach(void *recorder, void *model)
 {
-    ((ivl_sim_model_t *)model)->core = (ivl_sim_core_t){.context = recorder,
-                                                        .open = open_port,
-                                                        .close = close_port,
-                                                        .init = init,
-                                                        .commit = commit,
-                                                        .step = step,
-                                                        .every_tick = true};
+    ((ivl_sim_model_t *)model)->core = (ivl_sim_core_t){
+        .context = recorder, .open = open_port, .close = close_port, .init = init, .commit = commit, .step = step, .every_tick = true};
 }
 
 int ivl_record_close(void *recorder)
 {
     recorder_t *r = recorder;
-    bool bad = r->bad;
+    bool        bad = r->bad;
     bad = (fclose(r->requests) != 0) || bad;
     bad = (fclose(r->replies) != 0) || bad;
     free(r);

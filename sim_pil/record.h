@@ -24,4 +24,4 @@ void ivl_record_attach(void *recorder, void *model);
 /// @return 0, or -1 if not everything could be written or more than one thread flew
 int ivl_record_close(void *recorder);
 
-#endif // IVL_RECORD_H
+#endif  // IVL_RECORD_H

@@ -29,5 +29,4 @@ static void step(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state,
     ivl_step(cfg, state, in, out);
 }
 
-const ivl_sim_core_t ivl_sim_core_linked = {
-    .open = open_port, .close = close_port, .init = init, .commit = commit, .step = step};
+const ivl_sim_core_t ivl_sim_core_linked = {.open = open_port, .close = close_port, .init = init, .commit = commit, .step = step};

@@ -9,16 +9,16 @@
 /// The `state` of a call is owned by the world; after the call it equals the state of the core, wherever that lives.
 typedef struct
 {
-    void *context; ///< argument of open
+    void *context;  ///< argument of open
     void *(*open)(void *context);
     void (*close)(void *port);
     void (*init)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state);
     ivl_status_t (*commit)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy);
     void (*step)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out);
-    bool every_tick; ///< false: ticks are left out while the core's motors are latched off, when they decide nothing
+    bool every_tick;  ///< false: ticks are left out while the core's motors are latched off, when they decide nothing
 } ivl_sim_core_t;
 
 /// The core that is linked with the simulator; its port is NULL.
 extern const ivl_sim_core_t ivl_sim_core_linked;
 
-#endif // IVL_SIM_CORE_H
+#endif  // IVL_SIM_CORE_H

@@ -1,6 +1,6 @@
 # Compiles firmware core, C tests and the programs of firmware/stm32f405 for the STM32F405.  Called by the Makefile as
 #     make -f tools/stm32.mk FLAVOUR=<flavour> <target>
-# Targets: core, programs, tests, check, install.  Everything made is in build/<flavour>/.
+# Targets: core, programs, tests, check, fuzz, install, layout.  Everything made is in build/<flavour>/.
 
 FLAVOUR ?= stm32-Os
 CLANG   ?= clang-14
@@ -55,7 +55,7 @@ INSTALLED := host/ivl/_native/stm32f405.elf
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core programs tests check install FORCE
+.PHONY: core programs tests check fuzz install layout FORCE
 
 core: $(CORE)
 
@@ -73,6 +73,17 @@ install: $(INSTALLED)
 $(INSTALLED): $(BUILD)/tick_server.elf
 	@mkdir -p $(@D)
 	@cp $< $@.new && mv -f $@.new $@
+
+# ten million ticks, half of them on inputs that are spoiled in bursts
+fuzz:
+	@$(MAKE) --no-print-directory -f tools/stm32.mk FLAVOUR=$(FLAVOUR) BUILD=build/$(FLAVOUR)-fuzz FUZZ_FLIGHTS=20000 TIMEOUT_S=1800 run-test_ivl_fuzz
+
+# how structs lie on this computer: for a comparison of debug informations
+layout: build/layout/layout.o
+
+build/layout/layout.o: tests/stm32/layout.c $(wildcard firmware/core/*.h) $(TARGET)/ivl_port.h
+	@mkdir -p $(@D)
+	@$(or $(CC),cc) -std=c11 -g -Ifirmware/core -I$(TARGET) -c -o $@ $<
 
 define link
 @echo '  LINK  $@'

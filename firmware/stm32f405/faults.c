@@ -75,11 +75,16 @@ static const struct
     const char *name;
     void (*commit)(void);
 } FAULTS[] = {
-    {"no_fpu", no_fpu},       {"undefined_instruction", undefined_instruction},
-    {"unaligned_float", unaligned_float}, {"no_memory", no_memory},
-    {"not_code", not_code},   {"escalated", escalated},
-    {"interrupt", interrupt}, {"nmi", nmi},
-    {"runaway_stack", runaway_stack}, {"hang", hang},
+    {"no_fpu", no_fpu},
+    {"undefined_instruction", undefined_instruction},
+    {"unaligned_float", unaligned_float},
+    {"no_memory", no_memory},
+    {"not_code", not_code},
+    {"escalated", escalated},
+    {"interrupt", interrupt},
+    {"nmi", nmi},
+    {"runaway_stack", runaway_stack},
+    {"hang", hang},
 };
 
 int main(void)

@@ -43,10 +43,10 @@ typedef struct
 
 typedef struct
 {
-    int32_t     status;  ///< of COMMIT, else 0
+    int32_t     status;     ///< of COMMIT, else 0
     uint32_t    n_request;  ///< of this slot since its last INIT, from 0: nothing was lost
-    ivl_state_t state;   ///< after the operation
-    ivl_out_t   out;     ///< of STEP, else zero
+    ivl_state_t state;      ///< after the operation
+    ivl_out_t   out;        ///< of STEP, else zero
 } ivl_port_reply_t;
 
 _Static_assert(sizeof(ivl_phase_t) == 4u && sizeof(ivl_request_t) == 4u && sizeof(ivl_status_t) == 4u, "enums of 32 bits on both sides");

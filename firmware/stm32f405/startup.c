@@ -5,7 +5,7 @@
 #include "semihost.h"
 
 // from the linker script
-extern char stack_top[], data_begin[], data_end[], bss_begin[], bss_end[];
+extern char       stack_top[], data_begin[], data_end[], bss_begin[], bss_end[];
 extern const char data_load[];
 extern uint64_t   fault_stack[];
 
@@ -30,8 +30,8 @@ enum
     FRAME_PC = 6       // word of the exception frame
 };
 
-static const uint32_t FAULTS_ENABLED = 7u << 16;        // memory, bus and usage faults, each with its own exception
-static const uint32_t FPU_FULL_ACCESS = 0xfu << 20;     // coprocessors 10 and 11
+static const uint32_t FAULTS_ENABLED = 7u << 16;     // memory, bus and usage faults, each with its own exception
+static const uint32_t FPU_FULL_ACCESS = 0xfu << 20;  // coprocessors 10 and 11
 static const uint32_t RAM_BEGIN = 0x20000000u;
 
 typedef void (*handler_t)(void);

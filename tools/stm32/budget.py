@@ -24,6 +24,8 @@ from replay import PHASES, RUN
 BASELINE = Path(__file__).parent / "baseline.json"
 CLOCK_HZ = 168e6
 TICK_HZ = 500.0
+VEHICLE_BUILD = "stm32-Os"
+"""Compiled as the vehicle's firmware is: the budget of the flash is that of this build."""
 LIMITS = {"flash_bytes": 16384, "ram_bytes": 2048, "stack_bytes": 512, "instructions_max": 3000, "cpu_percent": 2.0}
 MARGINS = {"flash_bytes": 0.03, "ram_bytes": 0.0, "stack_bytes": 0.05, "instructions_max": 0.05, "bound_max": 0.05}
 """Growth over the baseline that is accepted without an update of it."""
@@ -109,7 +111,12 @@ def summary(figures: dict[str, Any]) -> dict[str, float]:
 
 def exceeded(found: dict[str, float], name: str) -> list[str]:
     """Budgets that a build does not keep."""
-    return [f"{name}: {key} is {found[key]:g}, the budget is {limit:g}" for key, limit in LIMITS.items() if found[key] > limit]
+    limits = {key: limit for key, limit in LIMITS.items() if key != "flash_bytes" or name == VEHICLE_BUILD}
+    return [
+        f"{name}: {key} is {found[key]:g}, the budget is {limit:g}"
+        for key, limit in limits.items()
+        if found[key] > limit
+    ]
 
 
 def grown(found: dict[str, float], accepted: dict[str, float], name: str) -> list[str]:

@@ -10,22 +10,25 @@ from elftools.elf.elffile import ELFFile
 ENTRIES = ("ivl_step", "ivl_init", "ivl_policy_commit", "ivl_cfg_check", "ivl_cfg_defaults")
 STRUCTS = ("ivl_cfg_t", "ivl_state_t", "ivl_in_t", "ivl_out_t")
 ALLOWED_CALLS = re.compile(r"mem(cpy|set|move|cmp)|__aeabi_mem(cpy|set|clr|move)[48]?")
-_FORBIDDEN_CODE = re.compile(r"\tvfn?m[as]\.|\t\S+\.f64")  # fused multiply-add (chained vmla rounds twice and is exact), double
+_FORBIDDEN_CODE = re.compile(
+    r"\tvfn?m[as]\.|\t\S+\.f64"
+)  # fused multiply-add (chained vmla rounds twice and is exact), double
 _FUNCTION = re.compile(r"^[0-9a-f]+ <([^>]+)>:$")
 _INSTRUCTION = re.compile(r"^\s*[0-9a-f]+:\t(\S+)\t?([^@;]*)")
 _BRANCH = re.compile(r"(?:bl?|b[a-z]{2}|cbn?z)(?:\.[nw])? (?:\w+, )?[0-9a-f]+ <([^>]+)>")
+_WRITE, _ALLOC = 1, 2  # section flags
 _INDIRECT = "a pointer"
 _NOT_CONSTANT = 1 << 30
 
 
 def flash_bytes(objects: list[Path]) -> int:
     """Code and constants of all objects, also those that a linker might drop."""
-    return sum(_size_of(path, lambda flags, kind: bool(flags & 2) and kind == "SHT_PROGBITS") for path in objects)
+    return sum(_size_of(path, _ALLOC) for path in objects)
 
 
 def variable_bytes(objects: list[Path]) -> int:
     """Variables that live longer than a call."""
-    return sum(_size_of(path, lambda flags, kind: flags & 3 == 3) for path in objects)
+    return sum(_size_of(path, _ALLOC | _WRITE) for path in objects)
 
 
 def instance_bytes(program: Path) -> int:
@@ -33,10 +36,10 @@ def instance_bytes(program: Path) -> int:
     return sum(layout.struct(program, name)[1] for name in STRUCTS)
 
 
-def _size_of(path: Path, counts) -> int:  # noqa: ANN001
+def _size_of(path: Path, flags: int) -> int:
     with path.open("rb") as file:
         headers = [section.header for section in ELFFile(file).iter_sections()]
-    return sum(h["sh_size"] for h in headers if counts(h["sh_flags"], h["sh_type"]))
+    return sum(h["sh_size"] for h in headers if h["sh_flags"] & flags == flags)
 
 
 def broken_rules(objects: list[Path], prefix: str = "arm-none-eabi-") -> list[str]:
@@ -56,9 +59,9 @@ def broken_rules(objects: list[Path], prefix: str = "arm-none-eabi-") -> list[st
 def worst_stack(program: Path, prefix: str = "arm-none-eabi-") -> dict[str, int]:
     """Worst stack of each entry of a linked program, bytes, from its machine code.
 
-    Each function's frame is everything that its instructions take from the stack, as if all of them were executed.  (The
-    figures of gcc's -fstack-usage leave out the registers of an argument that is passed in registers and memory: 16 of 392
-    bytes of ivl_step.)  A call through a pointer may reach every function whose address stands among the constants.
+    Each function's frame is everything that its instructions take from the stack, as if all of them were executed.
+    (The figures of gcc's -fstack-usage leave out arguments that are passed half in registers: 16 of 392 bytes of
+    ivl_step.)  A call through a pointer may reach every function whose address stands among the constants.
 
     Raises:
         RuntimeError: Recursion, a frame of changing size, or a call that cannot be followed.
@@ -115,7 +118,8 @@ def _addressed(program: Path) -> set[str]:
         elf = ELFFile(file)
         symbols = elf.get_section_by_name(".symtab").iter_symbols()
         by_address = {s["st_value"]: s.name for s in symbols if s["st_info"].type == "STT_FUNC"}
-        data = elf.get_section_by_name(".rodata").data()
+        constants = elf.get_section_by_name(".rodata")
+        data = constants.data() if constants else b""
     words = (int.from_bytes(data[i : i + 4], "little") for i in range(0, len(data) - 3, 4))
     return {by_address[word] for word in words if word in by_address}
 

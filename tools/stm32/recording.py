@@ -1,4 +1,4 @@
-"""Landings of the simulator, recorded as requests to the flight core and its replies on this computer (sim_pil/record.h)."""
+"""Landings of the simulator, recorded as requests to the flight core and its replies here (sim_pil/record.h)."""
 
 import ctypes
 from collections.abc import Iterator
@@ -6,8 +6,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import ivl
 import numpy as np
+
+import ivl
 from ivl import native
 
 GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
@@ -80,7 +81,8 @@ def _overrides(rng: np.random.Generator) -> dict[str, float]:
 def _recorder(recording: Recording, fault_norm: float, seed: int) -> Iterator:
     c = native.library().c
     c.ivl_record_create.restype = ctypes.c_void_p
-    c.ivl_record_create.argtypes = [ctypes.c_char_p] * 2 + [ctypes.c_double, ctypes.c_uint64, ctypes.c_char_p, ctypes.c_size_t]
+    text = ctypes.c_char_p
+    c.ivl_record_create.argtypes = [text, text, ctypes.c_double, ctypes.c_uint64, text, ctypes.c_size_t]
     c.ivl_record_attach.argtypes = [ctypes.c_void_p] * 2
     c.ivl_record_close.argtypes = [ctypes.c_void_p]
     error = ctypes.create_string_buffer(_ERROR_BYTES)

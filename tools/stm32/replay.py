@@ -59,19 +59,27 @@ def replay(program: Path, recorded: Recording) -> Verdict:
     Raises:
         RuntimeError: The program failed, or did not answer every request.
     """
+    problem = None
     with tempfile.TemporaryFile() as errors:
-        with recorded.requests.open("rb") as requests:
-            run = subprocess.Popen(
+        with (
+            recorded.requests.open("rb") as requests,
+            recorded.replies.open("rb") as expected,
+            recorded.requests.open("rb") as asked,
+            subprocess.Popen(
                 [RUN, program], stdin=requests, stdout=subprocess.PIPE, stderr=errors, env=_environment()
-            )
-        assert run.stdout is not None
-        with run.stdout as answers, recorded.replies.open("rb") as expected, recorded.requests.open("rb") as asked:
-            verdict = _compare(program, answers, expected, asked)
-        status = run.wait()
+            ) as run,
+        ):
+            assert run.stdout is not None
+            try:
+                verdict = _compare(program, run.stdout, expected, asked)
+            except RuntimeError as error:
+                problem = error  # its cause, if the program failed, is the exit code
         errors.seek(0)
         message = errors.read().decode(errors="replace").strip()
-    if status != 0:
-        raise RuntimeError(f"{program}: exit code {status}: {message}")
+    if run.returncode != 0:
+        raise RuntimeError(f"{program}: exit code {run.returncode}: {message}") from problem
+    if problem:
+        raise problem
     return verdict
 
 
@@ -79,7 +87,7 @@ def _environment() -> dict[str, str]:
     return {**os.environ, "TIMEOUT_S": str(_TIMEOUT_S)}
 
 
-def _compare(program: Path, answers, expected, asked) -> Verdict:  # noqa: ANN001
+def _compare(program: Path, answers, expected, asked) -> Verdict:
     _, hello_size = layout.struct(program, "ivl_port_hello_t")
     if answers.read(hello_size) != expected.read(hello_size):
         raise RuntimeError(f"{program}: sizes of structs differ from those on this computer, or no greeting came")
