@@ -1,18 +1,15 @@
 /// @file ivl_cfg.c
 #include "ivl_cfg.h"
 
+#include <string.h>
+
 #include "ivl_pwm.h"
 #include "ivl_wire.h"
 
-#define SET_DEFAULT(ctype, group, name, field, unit, min, max, dflt, doc) cfg->field = (ctype)(dflt);
-
-void ivl_cfg_defaults(ivl_cfg_t *cfg)
-{
-    IVL_PARAMS(SET_DEFAULT);
-}
-
 #define ROW(ctype, group, name, field, unit, min, max, dflt, doc)  ROW_##field,
 #define NAME(ctype, group, name, field, unit, min, max, dflt, doc) name,
+#define ENTRY(ctype, group, name, field, unit, min, max, dflt, doc)                                                                        \
+    {offsetof(ivl_cfg_t, field), sizeof(ctype), (float)(min), (float)(max), (float)(dflt)},
 
 enum
 {
@@ -21,16 +18,58 @@ enum
 
 static const char *const NAMES[] = {IVL_PARAMS(NAME)};
 
-// one comparison per row of the table, in positive form so that NaN is refused
-#define REFUSE_OUTSIDE(ctype, group, name, field, unit, min, max, dflt, doc)                                                               \
-    if (!(((float)cfg->field >= (float)(min)) && ((float)cfg->field <= (float)(max))))                                                     \
-    {                                                                                                                                      \
-        return ROW_##field;                                                                                                                \
+// a member of one byte is a uint8_t, one of four a float
+typedef struct
+{
+    uint16_t offset, size;
+    float    min, max, dflt;
+} entry_t;
+
+static const entry_t ENTRIES[] = {IVL_PARAMS(ENTRY)};
+
+static float get(const ivl_cfg_t *cfg, const entry_t *e)
+{
+    const uint8_t *at = (const uint8_t *)cfg + e->offset;
+    float          value = (float)*at;
+    if (e->size == sizeof value)
+    {
+        memcpy(&value, at, sizeof value);
     }
+    return value;
+}
+
+static void set(ivl_cfg_t *cfg, const entry_t *e, float value)
+{
+    uint8_t *at = (uint8_t *)cfg + e->offset;
+    if (e->size == sizeof value)
+    {
+        memcpy(at, &value, sizeof value);
+    }
+    else
+    {
+        *at = (uint8_t)value;
+    }
+}
+
+void ivl_cfg_defaults(ivl_cfg_t *cfg)
+{
+    for (int row = 0; row < (int)ROW_COUNT; row++)
+    {
+        set(cfg, &ENTRIES[row], ENTRIES[row].dflt);
+    }
+}
 
 static int bad_range(const ivl_cfg_t *cfg)
 {
-    IVL_PARAMS(REFUSE_OUTSIDE)
+    for (int row = 0; row < (int)ROW_COUNT; row++)
+    {
+        // in positive form, so that NaN is refused
+        const float value = get(cfg, &ENTRIES[row]);
+        if (!((value >= ENTRIES[row].min) && (value <= ENTRIES[row].max)))
+        {
+            return row;
+        }
+    }
     return -1;
 }
 
@@ -91,11 +130,12 @@ ivl_status_t ivl_cfg_check(const ivl_cfg_t *cfg)
     return (ivl_cfg_bad_row(cfg) < 0) ? IVL_OK : IVL_ERR_RANGE;
 }
 
-#define ADD_TO_CRC(ctype, group, name, field, unit, min, max, dflt, doc) crc = ivl_wire_crc(crc, &cfg->field, sizeof cfg->field);
-
 uint32_t ivl_cfg_crc(const ivl_cfg_t *cfg)
 {
     uint32_t crc = 0;
-    IVL_PARAMS(ADD_TO_CRC)
+    for (int row = 0; row < (int)ROW_COUNT; row++)
+    {
+        crc = ivl_wire_crc(crc, (const uint8_t *)cfg + ENTRIES[row].offset, ENTRIES[row].size);
+    }
     return crc;
 }
