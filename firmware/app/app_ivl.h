@@ -1,0 +1,112 @@
+/// @file app_ivl.h
+/// The app's memory, and what its files ask of each other.
+///
+/// Three tasks meet here.  The stabilizer (priority 5, 1 kHz) runs the controller hooks, the core and the recorder, and never waits.
+/// PARAM (priority 1) writes `staged`.  The app's own task (priority 1) talks to the host.  They pass whole values through mailboxes: whoever
+/// fills one waits until it is empty, and a reader that is faster than the writer finds it either full or empty, never half filled.
+#ifndef APP_IVL_H
+#define APP_IVL_H
+#include <stdatomic.h>
+
+#include "ivl.h"
+#include "ivl_attitude.h"
+#include "ivl_handover.h"
+#include "ivl_record.h"
+#include "ivl_wire.h"
+
+#define APP_CONFIG_NONE 255u  ///< no row of IVL_PARAMS
+
+typedef struct
+{
+    uint32_t  seq;  ///< value that was written to ivl.commit
+    ivl_cfg_t cfg;
+} app_config_request_t;
+
+typedef struct
+{
+    uint32_t seq;
+    int8_t   status;  ///< ivl_wire_status_t
+    uint8_t  bad;     ///< row of IVL_PARAMS, APP_CONFIG_NONE
+} app_config_result_t;
+
+/// A mailbox for one value of a type.
+#define APP_MAILBOX(type)                                                                                                                  \
+    struct                                                                                                                                 \
+    {                                                                                                                                      \
+        atomic_bool full;                                                                                                                  \
+        type        value;                                                                                                                 \
+    }
+
+typedef enum
+{
+    APP_OWNER_STOCK,
+    APP_OWNER_CORE
+} app_owner_t;
+
+/// Written by the stabilizer's task alone, unless a line says otherwise; others may read single numbers for logs.
+typedef struct
+{
+    // the core
+    ivl_cfg_t      cfg;
+    ivl_state_t    state;
+    ivl_in_t       in;
+    ivl_out_t      out;
+    ivl_recorder_t recorder;
+
+    // what is sensed
+    ivl_attitude_t attitude;
+    ivl_vec3_t     p_seen_W_m;       ///< position of the last call
+    uint64_t       t_pose_us;        ///< when it last changed
+    uint64_t       t_link_us;        ///< when the link was last up
+    uint64_t       t_host_us;        ///< when the host last sent a command
+    bool           has_host;         ///< it ever did
+    _Atomic float  p_sigma_m;        ///< written by the app's task
+    atomic_bool    motors_bypassed;  ///< written by the app's task
+    bool           configured;       ///< a configuration was put in force since the start
+
+    // who drives the motors
+    app_owner_t    owner;
+    ivl_handover_t handover;
+    float          collective_norm;  ///< mean thrust of the last tick, of either owner
+    atomic_bool    was_handed_back;  ///< in flight, to the stock controller; cleared by the app's task
+
+    // between tasks
+    ivl_cfg_t staged;                                ///< what PARAM writes
+    uint32_t  commit;                                ///< the parameter ivl.commit
+    APP_MAILBOX(app_config_request_t) config_in;     ///< PARAM to stabilizer
+    APP_MAILBOX(app_config_result_t) config_out;     ///< stabilizer to app
+    APP_MAILBOX(ivl_policy_t) policy_in;             ///< app to stabilizer
+    APP_MAILBOX(ivl_wire_policy_echo_t) policy_out;  ///< stabilizer to app
+    APP_MAILBOX(ivl_command_t) command_in;           ///< app to stabilizer
+    app_config_result_t config_result;               ///< last one, for logs; written by the app's task
+    uint32_t            config_crc;                  ///< of the configuration in force; written by the app's task
+    uint32_t            n_bad_packet;                ///< packets that were none of ours; written by the app's task
+} app_t;
+
+extern app_t ivl_app;
+
+/// Fill a mailbox if it is empty.  @return true if it was
+#define app_put(box, what) (atomic_load(&(box)->full) ? false : ((box)->value = (what), atomic_store(&(box)->full, true), true))
+
+/// Empty a mailbox into *what if it is full.  @return true if it was
+#define app_take(box, what) (atomic_load(&(box)->full) ? (*(what) = (box)->value, atomic_store(&(box)->full, false), true) : false)
+
+/// Default configuration of this platform: the core's, with what the SDK knows about the airframe.
+void app_config_defaults(ivl_cfg_t *cfg);
+
+/// Check and put in force, in the stabilizer's task.  Beyond ivl_cfg_check, the platform must be able to do it: a rate that the stabilizer
+/// has, and no more thrust than its largest.
+app_config_result_t app_config_apply(app_t *app, const app_config_request_t *request);
+
+/// Registered once, before the system starts.
+void app_memory_register(void);
+
+/// The tumble check of the SDK's supervisor: off in flip and coast only.
+void app_tumble_check_set(ivl_phase_t phase);
+
+/// One packet of the host, in the app's task: put it in force and answer.
+void app_packets_handle(app_t *app, const uint8_t *bytes, size_t size);
+
+/// Answer a commit of the configuration, if one has been done or cannot be.
+void app_packets_poll_config(app_t *app);
+#endif  // APP_IVL_H
