@@ -22,7 +22,7 @@ void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor,
 }
 
 /// Advances one rotor; returns the mean of (speed^2) over the step.
-static double spin(const ivl_sim_rotor_t *rotor, double tau_up, double tau_down, double *speed, double command)
+static double spin(const ivl_sim_rotor_t *rotor, double *speed, double command)
 {
     const double gap = *speed - command;
     if (fabs(gap) < 1.0e-9)
@@ -30,9 +30,8 @@ static double spin(const ivl_sim_rotor_t *rotor, double tau_up, double tau_down,
         *speed = command;
         return command * command;
     }
-    const double tau = (gap < 0.0) ? tau_up : tau_down;
     const double decay = (gap < 0.0) ? rotor->decay_up : rotor->decay_down;
-    const double share = tau / rotor->dt_s;
+    const double share = (gap < 0.0) ? rotor->share_up : rotor->share_down;
     *speed = command + gap * decay;
     return command * command + 2.0 * command * gap * share * (1.0 - decay) +
            0.5 * gap * gap * share * (1.0 - decay * decay);
@@ -79,12 +78,13 @@ ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_
         rotor->dt_s = dt_s;
         rotor->decay_up = ivl_sim_exp(-dt_s / raw->rotor_tau_up_s);
         rotor->decay_down = ivl_sim_exp(-dt_s / raw->rotor_tau_down_s);
+        rotor->share_up = raw->rotor_tau_up_s / dt_s;
+        rotor->share_down = raw->rotor_tau_down_s / dt_s;
     }
     const double gain = (raw->aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, height_m, q_WB) : 1.0;
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
-        const double square = spin(rotor, raw->rotor_tau_up_s, raw->rotor_tau_down_s, &rotor->speed_radps[i],
-                                   rotor->command_radps[i]);
+        const double square = spin(rotor, &rotor->speed_radps[i], rotor->command_radps[i]);
         const double thrust = rotor->scatter[i] * raw->rotor_thrust_constant_Ns2 * square;
         load.thrust_N += gain * thrust;
         load.torque_B_Nm[0] += gain * thrust * model->rotor_y_m[i];

@@ -17,7 +17,10 @@ typedef struct
     double speed_radps[IVL_SIM_MOTORS];
     double command_radps[IVL_SIM_MOTORS];
     double scatter[IVL_SIM_MOTORS];    ///< factor on each thrust, 1 without scatter
-    double dt_s, decay_up, decay_down; ///< exp(-dt/tau) of the last step: most steps are alike
+    // of the last step: most steps are alike
+    double dt_s;
+    double decay_up, decay_down; ///< exp(-dt/tau)
+    double share_up, share_down; ///< tau/dt
 } ivl_sim_rotor_t;
 
 /// Rotors that hover, and stay there.

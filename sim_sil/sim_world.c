@@ -224,9 +224,14 @@ static double longest_step(const ivl_sim_world_t *w, const ivl_sim_state_t *s, i
     {
         return most;
     }
-    const ivl_d3_t rate = ivl_d3(s->w_B_radps.x[lane], s->w_B_radps.y[lane], s->w_B_radps.z[lane]);
-    const double turns = most * sqrt(ivl_d3_dot(rate, rate)) / raw->step_turn_rad;
-    return (turns > 1.0) ? most / ((turns < TURNS_MAX) ? turns : TURNS_MAX) : most;
+    const ivl_d3_t turn = ivl_d3(most * s->w_B_radps.x[lane], most * s->w_B_radps.y[lane], most * s->w_B_radps.z[lane]);
+    const double square = ivl_d3_dot(turn, turn);
+    if (!(square > raw->step_turn_rad * raw->step_turn_rad))
+    {
+        return most;
+    }
+    const double turns = sqrt(square) / raw->step_turn_rad;
+    return most / ((turns < TURNS_MAX) ? turns : TURNS_MAX);
 }
 
 static void grade_step(ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, bool event)

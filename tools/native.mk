@@ -1,6 +1,6 @@
 # Compiles firmware core, simulator and C tests.  Called by the Makefile as
 #     make -f tools/native.mk FLAVOUR=<flavour> <target>
-# Targets: core, lib, check, golden.  Everything made is in build/<flavour>/.
+# Targets: core, lib, check.  Everything made is in build/<flavour>/.
 # Each source is compiled once per flavour; the library and the tests link the same objects.
 
 FLAVOUR ?= release
@@ -8,10 +8,13 @@ CLANG   ?= clang-14
 
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
-FLAVOURS           := release O0 san clang clang-O0
-OPTIMISE_release   := -O3
+# sse2 and avx2 are the release held to registers of 128 and 256 bits
+FLAVOURS           := release O0 san sse2 avx2 clang clang-O0
+OPTIMISE_release   := -O3 -fno-semantic-interposition
 OPTIMISE_O0        := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
+OPTIMISE_sse2      := -O3 -DIVL_SIM_WIDEST_BITS=128
+OPTIMISE_avx2      := -O3 -DIVL_SIM_WIDEST_BITS=256
 OPTIMISE_clang     := -O3
 OPTIMISE_clang-O0  := -O0
 ifeq ($(filter $(FLAVOUR),$(FLAVOURS)),)
@@ -46,13 +49,13 @@ FLAGS_tests/c := $(FLAGS_unity) $(FLAGS_sim_sil) -Itests/c
 BUILD   := build/$(FLAVOUR)
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
 SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_pil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
-SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_% tests/c/sim_golden.c,$(wildcard tests/c/*.c)))
+SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
 LIBRARY := host/ivl/_native/libivl_sil.so
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core lib check golden FORCE
+.PHONY: core lib check FORCE
 
 core: $(CORE)
 
@@ -63,8 +66,6 @@ check: $(TESTS:%=run-%)
 	@test -n '$(TESTS)' || { echo 'error: no tests/c/test_*.c found' >&2; exit 1; }
 	@echo '$(words $(TESTS)) C test programs passed ($(FLAVOUR))'
 
-golden: $(BUILD)/sim_golden
-
 # renamed into place, so that a running process keeps the library that it has mapped
 $(LIBRARY): $(BUILD)/libivl_sil.so
 	@mkdir -p $(@D)
@@ -72,13 +73,9 @@ $(LIBRARY): $(BUILD)/libivl_sil.so
 
 $(BUILD)/libivl_sil.so: $(CORE) $(SIM) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -shared -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) -shared -Wl,-Bsymbolic -o $@ $(filter %.o,$^) $(LDLIBS)
 
 $(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
-	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
-
-$(BUILD)/sim_golden: $(BUILD)/tests/c/sim_golden.o $(CORE) $(SIM) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
 
@@ -115,4 +112,4 @@ $(BUILD)/flags.txt: FORCE
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o) $(BUILD)/tests/c/sim_golden.o)
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))
