@@ -162,9 +162,9 @@ format: setup-dev ## format C and Python in place
 	@$(BIN)/clang-format -i $(C_FILES) < /dev/null
 
 .PHONY: bench
-bench: setup-dev build ## rollouts and steps per second per core, and the ratio to MuJoCo
+bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 against real time
 	$(say) 'bench'
-	@$(BIN)/ivl bench
+	@$(BIN)/ivl bench --pil
 
 .PHONY: setup-dev
 setup-dev: $(VENV)/.stamp-dev ## add what tests and lint need to .venv

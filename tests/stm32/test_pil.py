@@ -175,3 +175,10 @@ def small_pil(tmp_path: Path) -> Path:
     }
     path.write_text(yaml.safe_dump(data))
     return path
+
+
+def test_bench_tells_the_speed_against_real_time(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli(["bench", "--no-mujoco", "--pil", "--rollouts", "100", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["pil_times_real_time"] == pytest.approx(result["pil_ticks_per_s"] * 0.002)
+    assert result["pil_times_real_time"] > 1.0

@@ -13,6 +13,7 @@ import typer
 
 from ivl.cli import console
 from ivl.errors import IvlError
+from ivl.links import pil
 from ivl.world import World
 
 HELP = """Measure the simulator on one core, and against MuJoCo.
@@ -25,6 +26,8 @@ Examples:
       for a script
   ivl bench --no-mujoco
       without the comparison
+  ivl bench --pil
+      also with the flight core on an emulated STM32, against real time
 """
 _MUJOCO_BENCH = Path(__file__).parents[3] / "tests" / "mujoco" / "bench.py"
 
@@ -32,12 +35,15 @@ _MUJOCO_BENCH = Path(__file__).parents[3] / "tests" / "mujoco" / "bench.py"
 def bench(
     n: Annotated[int, typer.Option("--rollouts", help="Rollouts to time.", min=100)] = 4000,
     mujoco: Annotated[bool, typer.Option(help="Compare with MuJoCo.")] = True,
+    on_chip: Annotated[bool, typer.Option("--pil", help="Time the emulated STM32 in the loop as well.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Measure speed; HELP is the text that people see."""
     compare = _mujoco_rate() if mujoco else None
     result = measure(World("habas2021", "wide_short", "as_simulated"), n)
     result["ratio_to_mujoco"] = result["rollouts_per_s_per_core"] / compare() if compare else None
+    if on_chip:
+        result |= pil.measure()
     if as_json:
         console.print_json(result)
     else:

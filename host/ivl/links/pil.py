@@ -7,10 +7,13 @@ tick is one exchange over its standard input and output. Every worker thread has
 import ctypes
 import os
 import shutil
+import time
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ivl import native
 from ivl.errors import ConfigError, RolloutError
@@ -29,6 +32,36 @@ def qemu_command(image: Path) -> list[str]:
         os.environ.get(QEMU_ENV, "qemu-system-arm"), "-M", "netduinoplus2", "-display", "none", "-monitor", "none",
         "-serial", "none", "-semihosting-config", "enable=on,target=native", "-kernel", str(image),
     ]  # fmt: skip
+
+
+def image_of(uri: str) -> Path:
+    """The image that a URI names, pil:// or pil:///path/of/image.elf.
+
+    Raises:
+        ConfigError: It is missing.
+        RolloutError: The emulator is.
+    """
+    image = Path(uri.removeprefix("pil://") or IMAGE)
+    if not image.is_file():
+        raise ConfigError(f"{uri}: {image} is missing: run `make firmware`")
+    emulator = qemu_command(image)[0]
+    if shutil.which(emulator) is None:
+        raise RolloutError(
+            f"{uri}: {emulator} is not installed (Debian: qemu-system-arm; or name another in {QEMU_ENV})"
+        )
+    return image
+
+
+def measure(n_rollouts: int = 64) -> dict[str, float]:
+    """Ticks per second of one emulated chip that decides the paper's vertical landings, and that against real time."""
+    chips, world = Chips(qemu_command(image_of("pil://"))), World("habas2021", "wide_short", "as_simulated")
+    chips.attach(world)
+    began = time.perf_counter()
+    world.rollouts(2.5, 90.0, 4.8, np.linspace(6.0, 10.0, n_rollouts), threads=1)
+    elapsed_s = time.perf_counter() - began
+    chips.check()
+    rate = chips.n_ticks / elapsed_s
+    return {"pil_ticks_per_s": rate, "pil_times_real_time": rate * world.derived()["tick_s"]}
 
 
 class Chips:
@@ -81,16 +114,8 @@ class PilSource:
             ConfigError: The image is missing.
             RolloutError: The emulator cannot be started.
         """
-        image = Path(uri.removeprefix("pil://") or IMAGE)
-        if not image.is_file():
-            raise ConfigError(f"{uri}: {image} is missing: run `make firmware`")
-        command = qemu_command(image)
-        if shutil.which(command[0]) is None:
-            raise RolloutError(
-                f"{uri}: {command[0]} is not installed (Debian: qemu-system-arm; or name another in {QEMU_ENV})"
-            )
         self.world = experiment.make_world()
-        self.chips = Chips(command)
+        self.chips = Chips(qemu_command(image_of(uri)))
         self.chips.attach(self.world)
         self._source = WorldSource(self.world, experiment, threads)
 
