@@ -49,8 +49,7 @@ static double ceiling_effect(const ivl_sim_model_t *model, double height_m, cons
     return 1.0 + raw->aero_ceiling_gain_norm * upright * ratio * ratio;
 }
 
-/// No rotor turns or is told to.
-static bool still(const ivl_sim_rotor_t *rotor)
+bool ivl_sim_rotor_still(const ivl_sim_rotor_t *rotor)
 {
     double most = 0.0;
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
@@ -65,7 +64,7 @@ ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_
 {
     const ivl_sim_params_t *raw = &model->raw;
     ivl_sim_thrust_t load = {0.0, {0.0, 0.0, 0.0}};
-    if (still(rotor))
+    if (ivl_sim_rotor_still(rotor))
     {
         return load;
     }

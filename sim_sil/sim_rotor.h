@@ -29,6 +29,9 @@ void ivl_sim_rotor_init(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor);
 /// New thrust commands, N per motor; beyond [0, thrust_max] they saturate.
 void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const float thrust_N[4]);
 
+/// No rotor turns or is told to: there is nothing to advance.
+bool ivl_sim_rotor_still(const ivl_sim_rotor_t *rotor);
+
 /// Advances the rotors by dt and returns force and moment, each averaged over dt exactly.        [MODEL eq. 2.3, 2.4]
 /// @param[in] height_m, q_WB  of the body at the start of the step, for the ceiling effect
 ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m,

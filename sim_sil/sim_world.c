@@ -324,12 +324,12 @@ static bool plates_press(const ivl_sim_rate_t *rate, int lane)
 
 /// Graded after events, short while a plate presses, a whole share of what is left, and not beyond the instant at which a
 /// sliding foot may stick.
-static double choose_step(const ivl_sim_world_t *w, bool plates)
+static double choose_step(const ivl_sim_world_t *w, bool plates, bool any_sliding)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
     const double plate = raw->step_plate_s * raw->step_scale_norm;
     double step = (plates && w->step_s > plate) ? plate : w->step_s;
-    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    for (int i = 0; i < IVL_SIM_LEGS && any_sliding; i++)
     {
         const double wait = w->t_touch_s[i] + raw->leg_stick_delay_s - w->t_s;
         if (w->foot[i] == IVL_SIM_FOOT_SLIDING && wait > TIME_SLACK_S && wait < step)
@@ -345,14 +345,16 @@ static double choose_step(const ivl_sim_world_t *w, bool plates)
 static void propose(ivl_sim_group_t *group, int lane, double dt)
 {
     ivl_sim_world_t *w = &group->world[lane];
-    double q[4];
-    for (int i = 0; i < 4; i++)
-    {
-        q[i] = group->state.q_WB[i][lane];
-    }
+    ivl_sim_thrust_t thrust = {0.0, {0.0, 0.0, 0.0}};
     w->trial.dt_s = dt;
-    w->trial.rotor = w->rotor;
-    const ivl_sim_thrust_t thrust = ivl_sim_rotor_step(w->model, &w->trial.rotor, group->state.p_WB_m.z[lane], q, dt);
+    w->trial.powered = !ivl_sim_rotor_still(&w->rotor);
+    if (w->trial.powered)
+    {
+        const ivl_wide_t *q = group->state.q_WB;
+        const double attitude[4] = {q[0][lane], q[1][lane], q[2][lane], q[3][lane]};
+        w->trial.rotor = w->rotor;
+        thrust = ivl_sim_rotor_step(w->model, &w->trial.rotor, group->state.p_WB_m.z[lane], attitude, dt);
+    }
     group->dt_s[lane] = dt;
     group->load.thrust_N[lane] = thrust.thrust_N;
     group->load.torque_B_Nm.x[lane] = thrust.torque_B_Nm[0];
@@ -375,7 +377,7 @@ static void begin_step(ivl_sim_group_t *group, int lane)
     w->trial.starting = w->restart;
     w->restart = false;
     w->trial.n_try = 0;
-    propose(group, lane, w->trial.starting ? 0.0 : choose_step(w, plates_press(&group->last, lane)));
+    propose(group, lane, w->trial.starting ? 0.0 : choose_step(w, plates_press(&group->last, lane), group->contact.any_sliding));
 }
 
 /// Looks at the step that was tried.
@@ -392,7 +394,7 @@ static bool judge(ivl_sim_group_t *group, int lane)
     {
         return true;
     }
-    const double most = plates_press(&group->rate, lane) ? choose_step(w, true) : w->trial.dt_s;
+    const double most = plates_press(&group->rate, lane) ? choose_step(w, true, group->contact.any_sliding) : w->trial.dt_s;
     const double share = (w->trial.n_try < LOCATE_MAX) ? event_share(group, lane) : NO_EVENT;
     const double dt = (share < 1.0) ? share * w->trial.dt_s : w->trial.dt_s;
     if (dt < w->trial.dt_s || most < w->trial.dt_s - TIME_SLACK_S)
@@ -418,7 +420,10 @@ static void accept(ivl_sim_group_t *group, int lane)
         gaps(w, &group->next, lane, w->trial.gap_after_m);
         return;
     }
-    w->rotor = w->trial.rotor;
+    if (w->trial.powered)
+    {
+        w->rotor = w->trial.rotor;
+    }
     w->t_s += w->trial.dt_s;
     w->left_s -= w->trial.dt_s;
     w->n_step++;

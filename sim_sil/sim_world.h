@@ -26,7 +26,8 @@ typedef struct
 typedef struct
 {
     double dt_s;
-    ivl_sim_rotor_t rotor; ///< after the step
+    bool powered;          ///< some rotor turns
+    ivl_sim_rotor_t rotor; ///< after the step, if powered
     double gap_m[IVL_SIM_GAPS];       ///< before the step
     double gap_after_m[IVL_SIM_GAPS]; ///< after it; before the next
     int n_try;             ///< 0 at first; more while a contact is being located
