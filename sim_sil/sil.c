@@ -23,20 +23,17 @@ typedef struct
 #undef MEMBER
 } params_t;
 
-#define WORLD_ROW(group, name, suffix, unit, lo, hi, dflt, doc)                                                        \
+#define WORLD_ROW(group, name, suffix, unit, lo, hi, dflt, doc)                                                                            \
     {#group "." #name, "f8", (uint32_t)offsetof(params_t, world.group##_##name##_##suffix), 1, unit, lo, hi, dflt, doc},
-#define FIRMWARE_ROW(c_type, group, name, field, unit, lo, hi, dflt, doc)                                              \
+#define FIRMWARE_ROW(c_type, group, name, field, unit, lo, hi, dflt, doc)                                                                  \
     {"firmware." name, "f8", (uint32_t)offsetof(params_t, firmware_##field), 1, unit, lo, hi, dflt, doc},
 static const ivl_sil_field_t PARAM_FIELDS[] = {IVL_SIM_PARAMS(WORLD_ROW) IVL_FLIGHT_PARAMS(FIRMWARE_ROW)};
 
-#define ITEM_ROW(item, name, count, np, unit, lo, hi, dflt, doc)                                                       \
+#define ITEM_ROW(item, name, count, np, unit, lo, hi, dflt, doc)                                                                           \
     {#name, np, (uint32_t)offsetof(item, name), count, unit, lo, hi, dflt, doc},
-#define SPEC_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                     \
-    ITEM_ROW(ivl_sim_spec_t, name, count, np, unit, lo, hi, dflt, doc)
-#define OUTCOME_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                  \
-    ITEM_ROW(ivl_sim_outcome_t, name, count, np, unit, lo, hi, dflt, doc)
-#define TRACE_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                    \
-    ITEM_ROW(ivl_sim_trace_t, name, count, np, unit, lo, hi, dflt, doc)
+#define SPEC_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc)    ITEM_ROW(ivl_sim_spec_t, name, count, np, unit, lo, hi, dflt, doc)
+#define OUTCOME_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc) ITEM_ROW(ivl_sim_outcome_t, name, count, np, unit, lo, hi, dflt, doc)
+#define TRACE_ROW(c_type, name, count, np, unit, lo, hi, dflt, doc)   ITEM_ROW(ivl_sim_trace_t, name, count, np, unit, lo, hi, dflt, doc)
 static const ivl_sil_field_t SPEC_FIELDS[] = {IVL_SIM_SPEC_FIELDS(SPEC_ROW)};
 static const ivl_sil_field_t OUTCOME_FIELDS[] = {IVL_SIM_OUTCOME_FIELDS(OUTCOME_ROW)};
 static const ivl_sil_field_t TRACE_FIELDS[] = {IVL_SIM_TRACE_FIELDS(TRACE_ROW)};
@@ -60,14 +57,14 @@ typedef struct
     DERIVED(MEMBER)
 } derived_t;
 #undef MEMBER
-#define DERIVED_ROW(name, unit, expression, doc)                                                                       \
+#define DERIVED_ROW(name, unit, expression, doc)                                                                                           \
     {#name, "f8", (uint32_t)offsetof(derived_t, name), 1, unit, 0.0, IVL_SIM_UNLIMITED, IVL_SIM_REQUIRED, doc},
 static const ivl_sil_field_t DERIVED_FIELDS[] = {DERIVED(DERIVED_ROW)};
 
 typedef struct
 {
     const ivl_sil_field_t *fields;
-    uint32_t n, size;
+    uint32_t               n, size;
 } table_t;
 
 #define TABLE(array, type) {array, (uint32_t)(sizeof array / sizeof array[0]), (uint32_t)sizeof(type)}
@@ -95,7 +92,7 @@ const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *it
 static ivl_cfg_t firmware_of(const params_t *p)
 {
     ivl_cfg_t cfg;
-    ivl_cfg_defaults(&cfg); // those of the vehicle and the ceiling follow from the world
+    ivl_cfg_defaults(&cfg);  // those of the vehicle and the ceiling follow from the world
 #define ASSIGN(c_type, group, name, field, unit, lo, hi, dflt, doc) cfg.field = (c_type)p->firmware_##field;
     IVL_FLIGHT_PARAMS(ASSIGN)
 #undef ASSIGN
@@ -105,12 +102,12 @@ static ivl_cfg_t firmware_of(const params_t *p)
 /// Ranges are checked on the doubles, before a conversion that would be undefined for a NaN or a large number.
 static int firmware_in_range(const params_t *p, char *error, size_t error_size)
 {
-#define CHECK(c_type, group, name, field, unit, lo, hi, dflt, doc)                                                     \
-    if (!(p->firmware_##field >= (lo) && p->firmware_##field <= (hi)))                                                 \
-    {                                                                                                                  \
-        snprintf(error, error_size, "firmware.%s: %g is outside the allowed range %g .. %g %s", name,                  \
-                 p->firmware_##field, (double)(lo), (double)(hi), unit);                                               \
-        return 0;                                                                                                      \
+#define CHECK(c_type, group, name, field, unit, lo, hi, dflt, doc)                                                                         \
+    if (!(p->firmware_##field >= (lo) && p->firmware_##field <= (hi)))                                                                     \
+    {                                                                                                                                      \
+        snprintf(error, error_size, "firmware.%s: %g is outside the allowed range %g .. %g %s", name, p->firmware_##field, (double)(lo),   \
+                 (double)(hi), unit);                                                                                                      \
+        return 0;                                                                                                                          \
     }
     IVL_FLIGHT_PARAMS(CHECK)
 #undef CHECK
@@ -125,7 +122,7 @@ void *ivl_sil_model_create(const double *params, char *error, size_t error_size)
     {
         return NULL;
     }
-    const ivl_cfg_t firmware = firmware_of(&p);
+    const ivl_cfg_t  firmware = firmware_of(&p);
     ivl_sim_model_t *model = aligned_alloc(64, (sizeof *model + 63u) & ~(size_t)63u);
     if (model == NULL)
     {
@@ -148,7 +145,7 @@ void ivl_sil_model_free(void *model)
 void ivl_sil_model_derived(const void *model, void *derived)
 {
     const ivl_sim_model_t *m = model;
-    const derived_t d = {
+    const derived_t        d = {
 #define VALUE(name, unit, expression, doc) .name = (expression),
         DERIVED(VALUE)
 #undef VALUE
@@ -159,15 +156,15 @@ void ivl_sil_model_derived(const void *model, void *derived)
 typedef struct
 {
     const ivl_sim_model_t *model;
-    const ivl_sim_spec_t *specs;
-    ivl_sim_outcome_t *outcomes;
-    size_t n;
-    atomic_size_t next;
+    const ivl_sim_spec_t  *specs;
+    ivl_sim_outcome_t     *outcomes;
+    size_t                 n;
+    atomic_size_t          next;
 } batch_t;
 
 static bool next_of_batch(void *context, ivl_sim_job_t *job)
 {
-    batch_t *batch = context;
+    batch_t     *batch = context;
     const size_t i = atomic_fetch_add(&batch->next, 1);
     if (i >= batch->n)
     {
@@ -186,7 +183,7 @@ static void *fly_batch(void *argument)
 
 static int thread_count(int asked, size_t n)
 {
-    long threads = (asked > 0) ? asked : sysconf(_SC_NPROCESSORS_ONLN);
+    long         threads = (asked > 0) ? asked : sysconf(_SC_NPROCESSORS_ONLN);
     const size_t groups = (n + IVL_SIM_LANES - 1) / IVL_SIM_LANES;
     threads = (threads < 1) ? 1 : ((threads > THREADS_MAX) ? THREADS_MAX : threads);
     return ((size_t)threads > groups) ? (int)((groups > 0) ? groups : 1) : (int)threads;
@@ -194,16 +191,16 @@ static int thread_count(int asked, size_t n)
 
 int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes)
 {
-    batch_t batch = {.model = model, .specs = specs, .outcomes = outcomes, .n = n};
+    batch_t   batch = {.model = model, .specs = specs, .outcomes = outcomes, .n = n};
     pthread_t thread[THREADS_MAX];
     atomic_init(&batch.next, 0);
     const int extra = thread_count(n_threads, n) - 1;
-    int started = 0;
+    int       started = 0;
     while (started < extra && pthread_create(&thread[started], NULL, fly_batch, &batch) == 0)
     {
         started++;
     }
-    fly_batch(&batch); // this thread works too, so that a lack of others only costs time
+    fly_batch(&batch);  // this thread works too, so that a lack of others only costs time
     for (int i = 0; i < started; i++)
     {
         pthread_join(thread[i], NULL);
@@ -215,12 +212,12 @@ int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threa
 typedef struct
 {
     ivl_sim_job_t job;
-    bool taken;
+    bool          taken;
 } single_t;
 
 static bool next_of_single(void *context, ivl_sim_job_t *job)
 {
-    single_t *single = context;
+    single_t  *single = context;
     const bool first = !single->taken;
     single->taken = true;
     *job = single->job;
@@ -234,7 +231,7 @@ long ivl_sil_trace(const void *model, const void *spec, double period_s, void *r
         return -1;
     }
     ivl_sim_tracer_t tracer = {.period_s = period_s, .rows = rows, .capacity = capacity};
-    single_t single = {{spec, outcome, &tracer}, false};
+    single_t         single = {{spec, outcome, &tracer}, false};
     ivl_sim_fly(model, next_of_single, &single);
     return (long)tracer.n;
 }

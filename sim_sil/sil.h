@@ -12,23 +12,23 @@
 /// One field of a table.
 typedef struct
 {
-    const char *name; ///< parameters are dotted: "group.name"
-    const char *type; ///< numpy type code: "f8", "i4", "u4", "u8", "i1"
-    uint32_t offset;  ///< bytes from the start of the item
-    uint32_t count;   ///< elements; 1 is a scalar
-    const char *unit; ///< "1" if dimensionless
-    double lo, hi;    ///< allowed or possible range
-    double dflt;      ///< NaN: must be given
+    const char *name;    ///< parameters are dotted: "group.name"
+    const char *type;    ///< numpy type code: "f8", "i4", "u4", "u8", "i1"
+    uint32_t    offset;  ///< bytes from the start of the item
+    uint32_t    count;   ///< elements; 1 is a scalar
+    const char *unit;    ///< "1" if dimensionless
+    double      lo, hi;  ///< allowed or possible range
+    double      dflt;    ///< NaN: must be given
     const char *doc;
 } ivl_sil_field_t;
 
 typedef enum
 {
-    IVL_SIL_TABLE_PARAM,   ///< input of ivl_sil_model_create: doubles
-    IVL_SIL_TABLE_SPEC,    ///< input of a rollout
-    IVL_SIL_TABLE_OUTCOME, ///< result of a rollout
-    IVL_SIL_TABLE_TRACE,   ///< one row of a time series
-    IVL_SIL_TABLE_DERIVED, ///< what follows from the parameters
+    IVL_SIL_TABLE_PARAM,    ///< input of ivl_sil_model_create: doubles
+    IVL_SIL_TABLE_SPEC,     ///< input of a rollout
+    IVL_SIL_TABLE_OUTCOME,  ///< result of a rollout
+    IVL_SIL_TABLE_TRACE,    ///< one row of a time series
+    IVL_SIL_TABLE_DERIVED,  ///< what follows from the parameters
     IVL_SIL_TABLE_COUNT
 } ivl_sil_table_t;
 
@@ -45,8 +45,8 @@ const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *it
 /// @param[in] params  in the order of IVL_SIL_TABLE_PARAM
 /// @param[out] error  one line, if the result is NULL
 void *ivl_sil_model_create(const double *params, char *error, size_t error_size);
-void ivl_sil_model_free(void *model);
-void ivl_sil_model_derived(const void *model, void *derived);
+void  ivl_sil_model_free(void *model);
+void  ivl_sil_model_derived(const void *model, void *derived);
 
 /// Flies n landings on n_threads threads (0: as many as the machine has cores).  Each outcome depends on its spec alone.
 /// @return 0
@@ -59,4 +59,4 @@ long ivl_sil_trace(const void *model, const void *spec, double period_s, void *r
 const char *ivl_sil_end_reason(int code);
 const char *ivl_sil_phase_name(int code);
 
-#endif // IVL_SIL_H
+#endif  // IVL_SIL_H

@@ -27,7 +27,7 @@ IVL_SIM_INLINE int packed(int i, int j)
 void ivl_sim_lane_get(const ivl_sim_state_t *state, int lane, ivl_sim_kin_t *kin)
 {
     const double *from = (const double *)state;
-    double *to = (double *)kin;
+    double       *to = (double *)kin;
     for (size_t i = 0; i < sizeof *kin / sizeof *to; i++)
     {
         to[i] = from[i * IVL_SIM_LANES + (size_t)lane];
@@ -37,7 +37,7 @@ void ivl_sim_lane_get(const ivl_sim_state_t *state, int lane, ivl_sim_kin_t *kin
 void ivl_sim_lane_set(ivl_sim_state_t *state, int lane, const ivl_sim_kin_t *kin)
 {
     const double *from = (const double *)kin;
-    double *to = (double *)state;
+    double       *to = (double *)state;
     for (size_t i = 0; i < sizeof *kin / sizeof *from; i++)
     {
         to[i * IVL_SIM_LANES + (size_t)lane] = from[i];
@@ -84,7 +84,7 @@ static void invert(const double a[N][N], double inverse[N][N])
 static void add_mass_along(double m[N][N], double mu, ivl_d3_t x, ivl_d3_t a)
 {
     const ivl_d3_t moment = ivl_d3_cross(x, a);
-    const double row[N] = {a.x, a.y, a.z, moment.x, moment.y, moment.z};
+    const double   row[N] = {a.x, a.y, a.z, moment.x, moment.y, moment.z};
     for (int i = 0; i < N; i++)
     {
         for (int j = 0; j < N; j++)
@@ -97,10 +97,10 @@ static void add_mass_along(double m[N][N], double mu, ivl_d3_t x, ivl_d3_t a)
 /// Mass matrix of the body and of the hip ends of the legs.                                       [MODEL eq. 4.8]
 static void build_mass(const ivl_sim_model_t *model, const ivl_sim_foot_t foot[IVL_SIM_LEGS], double m[N][N])
 {
-    const ivl_sim_params_t *raw = &model->raw;
+    const ivl_sim_params_t    *raw = &model->raw;
     const ivl_sim_leg_model_t *leg = &model->leg;
-    const double diagonal[N] = {raw->body_mass_kg,         raw->body_mass_kg,         raw->body_mass_kg,
-                                raw->body_inertia_xx_kgm2, raw->body_inertia_yy_kgm2, raw->body_inertia_zz_kgm2};
+    const double               diagonal[N] = {raw->body_mass_kg,         raw->body_mass_kg,         raw->body_mass_kg,
+                                              raw->body_inertia_xx_kgm2, raw->body_inertia_yy_kgm2, raw->body_inertia_zz_kgm2};
     memset(m, 0, sizeof(double[N][N]));
     for (int i = 0; i < N; i++)
     {
@@ -128,14 +128,13 @@ static void store_packed(const double m[N][N], ivl_wide_t to[IVL_SIM_PACKED], in
     }
 }
 
-void ivl_sim_contact_set(const ivl_sim_model_t *model, ivl_sim_contact_t *contact, int lane,
-                         const ivl_sim_foot_t foot[IVL_SIM_LEGS])
+void ivl_sim_contact_set(const ivl_sim_model_t *model, ivl_sim_contact_t *contact, int lane, const ivl_sim_foot_t foot[IVL_SIM_LEGS])
 {
     double m[N][N], inverse[N][N];
     build_mass(model, foot, m);
-    invert((const double(*)[N])m, inverse);
-    store_packed((const double(*)[N])m, contact->mass6, lane);
-    store_packed((const double(*)[N])inverse, contact->inverse_mass6, lane);
+    invert((const double (*)[N])m, inverse);
+    store_packed((const double (*)[N])m, contact->mass6, lane);
+    store_packed((const double (*)[N])inverse, contact->inverse_mass6, lane);
     contact->any_sliding = false;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
@@ -170,8 +169,8 @@ static void inverse_while_sliding(const ivl_sim_model_t *model, const ivl_sim_co
         }
         if (slides)
         {
-            invert((const double(*)[N])m, inverse);
-            store_packed((const double(*)[N])inverse, inverse6, lane);
+            invert((const double (*)[N])m, inverse);
+            store_packed((const double (*)[N])inverse, inverse6, lane);
         }
     }
 }
@@ -182,11 +181,11 @@ static void inverse_while_sliding(const ivl_sim_model_t *model, const ivl_sim_co
 typedef struct
 {
     ivl_wrot_t R_WB;
-    ivl_w3_t up;   ///< the world's z axis
-    ivl_w3_t v, w; ///< of the body
-    ivl_w3_t rod[IVL_SIM_LEGS];   ///< hip to foot
-    ivl_w3_t n[IVL_SIM_LEGS];     ///< rod / length
-    ivl_w3_t v_rod[IVL_SIM_LEGS]; ///< velocity of the foot minus that of the hip
+    ivl_w3_t   up;                   ///< the world's z axis
+    ivl_w3_t   v, w;                 ///< of the body
+    ivl_w3_t   rod[IVL_SIM_LEGS];    ///< hip to foot
+    ivl_w3_t   n[IVL_SIM_LEGS];      ///< rod / length
+    ivl_w3_t   v_rod[IVL_SIM_LEGS];  ///< velocity of the foot minus that of the hip
 } kinematics_t;
 
 IVL_SIM_INLINE void kinematics(const ivl_sim_model_t *model, const ivl_sim_state_t *s, kinematics_t *k)
@@ -210,25 +209,25 @@ IVL_SIM_INLINE void kinematics(const ivl_sim_model_t *model, const ivl_sim_state
 /// Angles of a hip's two hinges and the directions in which they move the rod.                    [MODEL eq. 3.2]
 typedef struct
 {
-    ivl_wide_t alpha, beta; ///< deflection in the leg's plane, and sideways
-    ivl_w3_t e_alpha, e_beta;
+    ivl_wide_t alpha, beta;  ///< deflection in the leg's plane, and sideways
+    ivl_w3_t   e_alpha, e_beta;
     ivl_wide_t inv_cos_beta;
 } hinge_t;
 
 IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n)
 {
-    const ivl_d3_t e1 = leg->rest_B[i], e2 = leg->inplane_B[i], e3 = leg->sideways_B[i];
+    const ivl_d3_t   e1 = leg->rest_B[i], e2 = leg->inplane_B[i], e3 = leg->sideways_B[i];
     const ivl_wide_t c = ivl_w3_dot_d3(n, e1), s = ivl_w3_dot_d3(n, e2), t = ivl_w3_dot_d3(n, e3);
     const ivl_wide_t root = ivl_wide_sqrt(c * c + s * s);
     const ivl_wide_t least = ivl_wide(COS_SIDEWAYS_MIN);
     const ivl_wide_t lever = ivl_wide_select(root > least, root, least);
     // three quotients from one division: divisions are what an evaluation spends most of its time on
     const ivl_angle_t a = ivl_wide_fold(s, c), b = ivl_wide_fold(t, root);
-    const ivl_wide_t both = a.den * b.den;
-    const ivl_wide_t reciprocal = 1.0 / (both * lever);
-    const ivl_wide_t inv = both * reciprocal;
-    const ivl_wide_t ca = c * inv, sa = s * inv;
-    hinge_t h;
+    const ivl_wide_t  both = a.den * b.den;
+    const ivl_wide_t  reciprocal = 1.0 / (both * lever);
+    const ivl_wide_t  inv = both * reciprocal;
+    const ivl_wide_t  ca = c * inv, sa = s * inv;
+    hinge_t           h;
     h.alpha = ivl_wide_unfold(&a, a.num * b.den * lever * reciprocal);
     h.beta = ivl_wide_unfold(&b, b.num * a.den * lever * reciprocal);
     h.inv_cos_beta = inv;
@@ -242,10 +241,10 @@ IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n)
 /// [MODEL eq. 3.4]
 IVL_SIM_INLINE ivl_w3_t hip_couple(const ivl_sim_model_t *model, const kinematics_t *k, int i)
 {
-    const double stiffness = model->raw.leg_stiffness_Nmprad, damping = model->raw.leg_damping_Nmsprad;
-    const double inv_length = 1.0 / model->raw.leg_length_m;
-    const hinge_t h = hinge(&model->leg, i, k->n[i]);
-    const ivl_w3_t turning = ivl_w3_sub(k->v_rod[i], ivl_w3_cross(k->w, k->rod[i]));
+    const double     stiffness = model->raw.leg_stiffness_Nmprad, damping = model->raw.leg_damping_Nmsprad;
+    const double     inv_length = 1.0 / model->raw.leg_length_m;
+    const hinge_t    h = hinge(&model->leg, i, k->n[i]);
+    const ivl_w3_t   turning = ivl_w3_sub(k->v_rod[i], ivl_w3_cross(k->w, k->rod[i]));
     const ivl_wide_t alpha_rate = inv_length * ivl_w3_dot(turning, h.e_alpha) * h.inv_cos_beta;
     const ivl_wide_t beta_rate = inv_length * ivl_w3_dot(turning, h.e_beta);
     const ivl_wide_t torque_alpha = -(stiffness * h.alpha + damping * alpha_rate) * inv_length;
@@ -262,15 +261,14 @@ IVL_SIM_INLINE ivl_w3_t along_ceiling(ivl_wide_t sliding, ivl_w3_t up, ivl_w3_t 
 /// A leg's row of the constraint: multiplier direction g at the hip, its moment, its own compliance.  [MODEL eq. 4.9]
 typedef struct
 {
-    ivl_w3_t g, hip_x_g;
+    ivl_w3_t   g, hip_x_g;
     ivl_wide_t compliance;
 } row_t;
 
-IVL_SIM_INLINE row_t constraint_row(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const kinematics_t *k,
-                                    int i)
+IVL_SIM_INLINE row_t constraint_row(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const kinematics_t *k, int i)
 {
     const ivl_w3_t pn = along_ceiling(contact->sliding[i], k->up, k->n[i]);
-    row_t r;
+    row_t          r;
     r.g = ivl_w3_plus(k->n[i], model->leg.mass_cross_kg * contact->inverse_mass[i], pn);
     r.hip_x_g = ivl_w3_cross_from_d3(model->leg.hip_B_m[i], r.g);
     r.compliance = contact->inverse_mass[i] * ivl_w3_dot(k->n[i], pn) + ROD_COMPLIANCE_PER_KG;
@@ -302,9 +300,8 @@ IVL_SIM_INLINE void solve4(ivl_wide_t a[4][4], const ivl_wide_t b[4], ivl_wide_t
 }
 
 /// Solves  M u = b + J^T x,  J u + compliance x = r  for the twist u and the multipliers x.        [MODEL eq. 4.10]
-IVL_SIM_INLINE void solve_constrained(const ivl_wide_t inverse6[IVL_SIM_PACKED], const row_t rows[IVL_SIM_LEGS],
-                                      const ivl_wide_t b[N], const ivl_wide_t r[IVL_SIM_LEGS], ivl_wide_t u[N],
-                                      ivl_wide_t x[IVL_SIM_LEGS])
+IVL_SIM_INLINE void solve_constrained(const ivl_wide_t inverse6[IVL_SIM_PACKED], const row_t rows[IVL_SIM_LEGS], const ivl_wide_t b[N],
+                                      const ivl_wide_t r[IVL_SIM_LEGS], ivl_wide_t u[N], ivl_wide_t x[IVL_SIM_LEGS])
 {
     ivl_wide_t J[IVL_SIM_LEGS][N], W[IVL_SIM_LEGS][N], A[4][4], rhs[4];
     IVL_SIM_UNROLL
@@ -358,26 +355,25 @@ IVL_SIM_INLINE void solve_constrained(const ivl_wide_t inverse6[IVL_SIM_PACKED],
 /// Height of the highest point of a plate above the body origin.
 IVL_SIM_INLINE ivl_wide_t plate_top(const ivl_sim_plate_t *plate, ivl_w3_t up)
 {
-    return ivl_wide_abs(up.x) * plate->half_m[0] + ivl_wide_abs(up.y) * plate->half_m[1] +
-           ivl_wide_abs(up.z) * plate->half_m[2] + up.z * plate->center_z_m;
+    return ivl_wide_abs(up.x) * plate->half_m[0] + ivl_wide_abs(up.y) * plate->half_m[1] + ivl_wide_abs(up.z) * plate->half_m[2] +
+           up.z * plate->center_z_m;
 }
 
 /// Adds the wrench of one corner that presses on the ceiling: Hunt-Crossley normal force, regularised Coulomb friction.
 /// [MODEL eq. 5.1, 5.2]
-IVL_SIM_INLINE void corner_force(const ivl_sim_params_t *raw, const kinematics_t *k, ivl_wide_t height, ivl_d3_t x,
-                                 ivl_wide_t b[N])
+IVL_SIM_INLINE void corner_force(const ivl_sim_params_t *raw, const kinematics_t *k, ivl_wide_t height, ivl_d3_t x, ivl_wide_t b[N])
 {
     const ivl_wide_t zero = ivl_wide(0.0);
     const ivl_wide_t depth = height + ivl_w3_dot_d3(k->up, x) - raw->world_ceiling_height_m;
-    const ivl_w3_t v = ivl_w3_add(k->v, ivl_w3_cross_d3(k->w, x));
+    const ivl_w3_t   v = ivl_w3_add(k->v, ivl_w3_cross_d3(k->w, x));
     const ivl_wide_t depth_rate = ivl_w3_dot(k->up, v);
     const ivl_wide_t press = raw->plate_stiffness_Npm * depth * (1.0 + raw->plate_damping_spm * depth_rate);
     const ivl_mask_t touches = (depth > zero) & (press > zero);
-    const ivl_w3_t slip = ivl_w3_plus(v, -depth_rate, k->up);
-    const double slow = raw->plate_slip_speed_mps;
+    const ivl_w3_t   slip = ivl_w3_plus(v, -depth_rate, k->up);
+    const double     slow = raw->plate_slip_speed_mps;
     const ivl_wide_t drag = raw->plate_friction_norm * press / ivl_wide_sqrt(ivl_w3_dot(slip, slip) + slow * slow);
-    const ivl_w3_t f = ivl_w3_sub(ivl_w3_scale(-press, k->up), ivl_w3_scale(drag, slip));
-    const ivl_w3_t m = ivl_w3_cross_from_d3(x, f);
+    const ivl_w3_t   f = ivl_w3_sub(ivl_w3_scale(-press, k->up), ivl_w3_scale(drag, slip));
+    const ivl_w3_t   m = ivl_w3_cross_from_d3(x, f);
     const ivl_wide_t wrench[N] = {f.x, f.y, f.z, m.x, m.y, m.z};
     for (int i = 0; i < N; i++)
     {
@@ -386,12 +382,12 @@ IVL_SIM_INLINE void corner_force(const ivl_sim_params_t *raw, const kinematics_t
 }
 
 /// What acts on the body except the legs: weight, rotors, drag, plates, gyroscopic moment.
-IVL_SIM_INLINE void body_wrench(const ivl_sim_model_t *model, const ivl_sim_load_t *load, const kinematics_t *k,
-                                ivl_wide_t height, ivl_wide_t b[N], ivl_wide_t overlap[IVL_SIM_PLATES])
+IVL_SIM_INLINE void body_wrench(const ivl_sim_model_t *model, const ivl_sim_load_t *load, const kinematics_t *k, ivl_wide_t height,
+                                ivl_wide_t b[N], ivl_wide_t overlap[IVL_SIM_PLATES])
 {
     const ivl_sim_params_t *raw = &model->raw;
-    const double weight = raw->body_mass_kg * raw->world_gravity_mps2;
-    const double ixx = raw->body_inertia_xx_kgm2, iyy = raw->body_inertia_yy_kgm2, izz = raw->body_inertia_zz_kgm2;
+    const double            weight = raw->body_mass_kg * raw->world_gravity_mps2;
+    const double            ixx = raw->body_inertia_xx_kgm2, iyy = raw->body_inertia_yy_kgm2, izz = raw->body_inertia_zz_kgm2;
     b[0] = -weight * k->up.x - raw->aero_drag_xy_Nspm * k->v.x;
     b[1] = -weight * k->up.y - raw->aero_drag_xy_Nspm * k->v.y;
     b[2] = -weight * k->up.z - raw->aero_drag_z_Nspm * k->v.z + load->thrust_N;
@@ -425,25 +421,25 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
                                const ivl_sim_state_t *s, ivl_sim_rate_t *rate)
 {
     const ivl_sim_leg_model_t *leg = &model->leg;
-    const double length = model->raw.leg_length_m, gravity = model->raw.world_gravity_mps2;
-    const double joint = model->raw.leg_foot_damping_Nmsprad / (length * length);
-    const double sigma = STABILISATION_PER_S;
-    kinematics_t k;
+    const double               length = model->raw.leg_length_m, gravity = model->raw.world_gravity_mps2;
+    const double               joint = model->raw.leg_foot_damping_Nmsprad / (length * length);
+    const double               sigma = STABILISATION_PER_S;
+    kinematics_t               k;
     kinematics(model, s, &k);
     ivl_wide_t b[N], r[IVL_SIM_LEGS], u[N], axial[IVL_SIM_LEGS];
-    ivl_w3_t f_foot[IVL_SIM_LEGS], centripetal[IVL_SIM_LEGS];
-    row_t rows[IVL_SIM_LEGS];
+    ivl_w3_t   f_foot[IVL_SIM_LEGS], centripetal[IVL_SIM_LEGS];
+    row_t      rows[IVL_SIM_LEGS];
     body_wrench(model, load, &k, s->p_WB_m.z, b, rate->overlap_m);
     IVL_SIM_UNROLL
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        const ivl_d3_t hip = leg->hip_B_m[i];
+        const ivl_d3_t   hip = leg->hip_B_m[i];
         const ivl_wide_t inv_mass = contact->inverse_mass[i], sliding = contact->sliding[i];
 
         // forces on the rod's ends: hip springs, friction of a stuck foot's joint, weight
-        const ivl_w3_t couple = hip_couple(model, &k, i);
+        const ivl_w3_t   couple = hip_couple(model, &k, i);
         const ivl_wide_t held = ivl_wide_select(inv_mass > 0.0, ivl_wide(0.0), ivl_wide(joint));
-        const ivl_w3_t pair = ivl_w3_plus(couple, -held, k.v_rod[i]);
+        const ivl_w3_t   pair = ivl_w3_plus(couple, -held, k.v_rod[i]);
         f_foot[i] = ivl_w3_plus(pair, ivl_wide(-leg->weight_foot_kg * gravity), k.up);
 
         // what the hip takes from the body if neither the body nor the constraint accelerated it
@@ -456,14 +452,12 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
 
         // length constraint: n.(a_foot - a_hip) = -|v_rod|^2 / L - stabilisation
         rows[i] = constraint_row(model, contact, &k, i);
-        const ivl_wide_t curvature =
-            ivl_w3_dot(k.v_rod[i], k.v_rod[i]) * (1.0 / length) + 2.0 * sigma * ivl_w3_dot(k.n[i], k.v_rod[i]) +
-            (0.5 * sigma * sigma / length) * (ivl_w3_dot(k.rod[i], k.rod[i]) - length * length);
-        r[i] = curvature + inv_mass * ivl_w3_dot(k.n[i], along_ceiling(sliding, k.up, f_foot[i])) -
-               ivl_w3_dot(rows[i].g, centripetal[i]);
+        const ivl_wide_t curvature = ivl_w3_dot(k.v_rod[i], k.v_rod[i]) * (1.0 / length) + 2.0 * sigma * ivl_w3_dot(k.n[i], k.v_rod[i]) +
+                                     (0.5 * sigma * sigma / length) * (ivl_w3_dot(k.rod[i], k.rod[i]) - length * length);
+        r[i] = curvature + inv_mass * ivl_w3_dot(k.n[i], along_ceiling(sliding, k.up, f_foot[i])) - ivl_w3_dot(rows[i].g, centripetal[i]);
     }
     const ivl_wide_t *inverse6 = contact->inverse_mass6;
-    ivl_wide_t rebuilt[IVL_SIM_PACKED];
+    ivl_wide_t        rebuilt[IVL_SIM_PACKED];
     if (contact->any_sliding)
     {
         memcpy(rebuilt, contact->inverse_mass6, sizeof rebuilt);
@@ -512,9 +506,9 @@ IVL_SIM_INLINE void leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact
                              const ivl_wide_t *dt_s, const ivl_sim_state_t *s, const ivl_sim_rate_t *last, ivl_sim_state_t *next,
                              ivl_sim_rate_t *rate)
 {
-    const ivl_wide_t dt = *dt_s; // by address: a vector argument may not pass between functions of different targets
+    const ivl_wide_t dt = *dt_s;  // by address: a vector argument may not pass between functions of different targets
     const ivl_wide_t half = 0.5 * dt;
-    ivl_sim_state_t mid;
+    ivl_sim_state_t  mid;
     mid.p_WB_m = ivl_w3_plus(s->p_WB_m, half, s->v_WB_mps);
     mid.v_WB_mps = ivl_w3_plus(s->v_WB_mps, half, last->a_WB_mps2);
     mid.w_B_radps = ivl_w3_plus(s->w_B_radps, half, last->alpha_B_radps2);
@@ -546,13 +540,12 @@ IVL_SIM_INLINE void leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact
 #define IVL_SIM_WIDEST_BITS 512
 #endif
 #if defined(__x86_64__)
-#define STEP_FOR(name, isa)                                                                                            \
-    __attribute__((target(isa))) static void name(                                                                     \
-        const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,                    \
-        const ivl_wide_t *dt_s, const ivl_sim_state_t *state, const ivl_sim_rate_t *last, ivl_sim_state_t *next,       \
-        ivl_sim_rate_t *rate)                                                                                          \
-    {                                                                                                                  \
-        leapfrog(model, contact, load, dt_s, state, last, next, rate);                                                \
+#define STEP_FOR(name, isa)                                                                                                                \
+    __attribute__((target(isa))) static void name(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact,                          \
+                                                  const ivl_sim_load_t *load, const ivl_wide_t *dt_s, const ivl_sim_state_t *state,        \
+                                                  const ivl_sim_rate_t *last, ivl_sim_state_t *next, ivl_sim_rate_t *rate)                 \
+    {                                                                                                                                      \
+        leapfrog(model, contact, load, dt_s, state, last, next, rate);                                                                     \
     }
 #if IVL_SIM_WIDEST_BITS >= 256
 STEP_FOR(leapfrog_avx2, "avx2")
@@ -564,9 +557,8 @@ STEP_FOR(leapfrog_avx512, "avx512f,avx512dq,prefer-vector-width=512")
 #endif
 #endif
 
-void ivl_sim_leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
-                      const ivl_wide_t *dt_s, const ivl_sim_state_t *state, const ivl_sim_rate_t *last,
-                      ivl_sim_state_t *next, ivl_sim_rate_t *rate)
+void ivl_sim_leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load, const ivl_wide_t *dt_s,
+                      const ivl_sim_state_t *state, const ivl_sim_rate_t *last, ivl_sim_state_t *next, ivl_sim_rate_t *rate)
 {
 #if defined(__x86_64__) && IVL_SIM_WIDEST_BITS >= 512
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
@@ -613,12 +605,12 @@ static ivl_d3_t first(ivl_w3_t a)
 void ivl_sim_impulse(const ivl_sim_model_t *model, const ivl_sim_foot_t foot[IVL_SIM_LEGS], ivl_sim_kin_t *kin)
 {
     const ivl_sim_leg_model_t *leg = &model->leg;
-    ivl_sim_contact_t contact;
-    ivl_sim_state_t s;
-    kinematics_t k;
-    ivl_wide_t b[N] = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}}, r[IVL_SIM_LEGS], u[N], axial[IVL_SIM_LEGS];
-    ivl_w3_t jump[IVL_SIM_LEGS], v_foot[IVL_SIM_LEGS];
-    row_t rows[IVL_SIM_LEGS];
+    ivl_sim_contact_t          contact;
+    ivl_sim_state_t            s;
+    kinematics_t               k;
+    ivl_wide_t                 b[N] = {{0.0}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}}, r[IVL_SIM_LEGS], u[N], axial[IVL_SIM_LEGS];
+    ivl_w3_t                   jump[IVL_SIM_LEGS], v_foot[IVL_SIM_LEGS];
+    row_t                      rows[IVL_SIM_LEGS];
     memset(&contact, 0, sizeof contact);
     ivl_sim_contact_set(model, &contact, 0, foot);
     spread_contact(&contact);
@@ -663,7 +655,7 @@ static double plate_energy(const ivl_sim_model_t *model, ivl_d3_t up, double hei
     for (int i = 0; i < IVL_SIM_CORNERS; i++)
     {
         const ivl_d3_t x = model->plate[p].corner_B_m[i];
-        const double depth = height_m + ivl_d3_dot(up, x) - model->raw.world_ceiling_height_m;
+        const double   depth = height_m + ivl_d3_dot(up, x) - model->raw.world_ceiling_height_m;
         energy += (depth > 0.0) ? 0.5 * model->raw.plate_stiffness_Npm * depth * depth : 0.0;
     }
     return energy;
@@ -671,28 +663,27 @@ static double plate_energy(const ivl_sim_model_t *model, ivl_d3_t up, double hei
 
 double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
 {
-    const ivl_sim_params_t *raw = &model->raw;
+    const ivl_sim_params_t    *raw = &model->raw;
     const ivl_sim_leg_model_t *leg = &model->leg;
-    ivl_sim_state_t s;
-    kinematics_t k;
+    ivl_sim_state_t            s;
+    kinematics_t               k;
     spread(kin, &s);
     kinematics(model, &s, &k);
     const ivl_d3_t v = first(k.v), w = first(k.w), up = first(k.up);
-    double energy = 0.5 * raw->body_mass_kg * ivl_d3_dot(v, v) +
-                    0.5 * (raw->body_inertia_xx_kgm2 * w.x * w.x + raw->body_inertia_yy_kgm2 * w.y * w.y +
-                           raw->body_inertia_zz_kgm2 * w.z * w.z) +
-                    raw->body_mass_kg * raw->world_gravity_mps2 * kin->p_WB_m[2];
+    double         energy =
+        0.5 * raw->body_mass_kg * ivl_d3_dot(v, v) +
+        0.5 * (raw->body_inertia_xx_kgm2 * w.x * w.x + raw->body_inertia_yy_kgm2 * w.y * w.y + raw->body_inertia_zz_kgm2 * w.z * w.z) +
+        raw->body_mass_kg * raw->world_gravity_mps2 * kin->p_WB_m[2];
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        const hinge_t h = hinge(leg, i, k.n[i]);
+        const hinge_t  h = hinge(leg, i, k.n[i]);
         const ivl_d3_t v_hip = ivl_d3_add(v, ivl_d3_cross(w, leg->hip_B_m[i]));
         const ivl_d3_t v_foot = ivl_d3_add(v_hip, first(k.v_rod[i]));
-        const double hip_height = kin->p_WB_m[2] + ivl_d3_dot(leg->hip_B_m[i], up);
+        const double   hip_height = kin->p_WB_m[2] + ivl_d3_dot(leg->hip_B_m[i], up);
         energy += 0.5 * leg->mass_hip_kg * ivl_d3_dot(v_hip, v_hip) + leg->mass_cross_kg * ivl_d3_dot(v_hip, v_foot) +
                   0.5 * leg->mass_foot_kg * ivl_d3_dot(v_foot, v_foot) +
                   0.5 * raw->leg_stiffness_Nmprad * (h.alpha[0] * h.alpha[0] + h.beta[0] * h.beta[0]) +
-                  raw->world_gravity_mps2 *
-                      (leg->weight_hip_kg * hip_height + leg->weight_foot_kg * kin->p_foot_W_m[i][2]);
+                  raw->world_gravity_mps2 * (leg->weight_hip_kg * hip_height + leg->weight_foot_kg * kin->p_foot_W_m[i][2]);
     }
     return energy + plate_energy(model, up, kin->p_WB_m[2], IVL_SIM_PROP_PLATE) +
            plate_energy(model, up, kin->p_WB_m[2], IVL_SIM_BASE_PLATE);
@@ -700,14 +691,13 @@ double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
 
 void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, double linear[3], double angular[3])
 {
-    const ivl_sim_params_t *raw = &model->raw;
+    const ivl_sim_params_t    *raw = &model->raw;
     const ivl_sim_leg_model_t *leg = &model->leg;
-    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
-    const ivl_d3_t p = ivl_d3_load(kin->p_WB_m), v = ivl_d3_load(kin->v_WB_mps), w = ivl_d3_load(kin->w_B_radps);
-    const ivl_d3_t spin = ivl_d3(raw->body_inertia_xx_kgm2 * w.x, raw->body_inertia_yy_kgm2 * w.y,
-                                 raw->body_inertia_zz_kgm2 * w.z);
-    ivl_d3_t l = ivl_d3_scale(raw->body_mass_kg, v);
-    ivl_d3_t a = ivl_d3_add(ivl_rot_apply(&R, spin), ivl_d3_cross(p, l));
+    const ivl_rot_t            R = ivl_rot_from_quat(kin->q_WB);
+    const ivl_d3_t             p = ivl_d3_load(kin->p_WB_m), v = ivl_d3_load(kin->v_WB_mps), w = ivl_d3_load(kin->w_B_radps);
+    const ivl_d3_t spin = ivl_d3(raw->body_inertia_xx_kgm2 * w.x, raw->body_inertia_yy_kgm2 * w.y, raw->body_inertia_zz_kgm2 * w.z);
+    ivl_d3_t       l = ivl_d3_scale(raw->body_mass_kg, v);
+    ivl_d3_t       a = ivl_d3_add(ivl_rot_apply(&R, spin), ivl_d3_cross(p, l));
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const ivl_d3_t hip = leg->hip_B_m[i];
@@ -715,8 +705,7 @@ void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, do
         const ivl_d3_t p_hip = ivl_d3_add(p, ivl_rot_apply(&R, hip));
         const ivl_d3_t v_foot = ivl_d3_load(kin->v_foot_W_mps[i]), p_foot = ivl_d3_load(kin->p_foot_W_m[i]);
         const ivl_d3_t l_hip = ivl_d3_add(ivl_d3_scale(leg->mass_hip_kg, v_hip), ivl_d3_scale(leg->mass_cross_kg, v_foot));
-        const ivl_d3_t l_foot =
-            ivl_d3_add(ivl_d3_scale(leg->mass_cross_kg, v_hip), ivl_d3_scale(leg->mass_foot_kg, v_foot));
+        const ivl_d3_t l_foot = ivl_d3_add(ivl_d3_scale(leg->mass_cross_kg, v_hip), ivl_d3_scale(leg->mass_foot_kg, v_foot));
         l = ivl_d3_add(l, ivl_d3_add(l_hip, l_foot));
         a = ivl_d3_add(a, ivl_d3_add(ivl_d3_cross(p_hip, l_hip), ivl_d3_cross(p_foot, l_foot)));
     }
@@ -726,6 +715,5 @@ void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, do
 
 double ivl_sim_plate_top(const ivl_sim_plate_t *plate, ivl_d3_t up)
 {
-    return fabs(up.x) * plate->half_m[0] + fabs(up.y) * plate->half_m[1] + fabs(up.z) * plate->half_m[2] +
-           up.z * plate->center_z_m;
+    return fabs(up.x) * plate->half_m[0] + fabs(up.y) * plate->half_m[1] + fabs(up.z) * plate->half_m[2] + up.z * plate->center_z_m;
 }

@@ -25,16 +25,15 @@
 
 static const double IVL_SIM_PI = 3.14159265358979323846;
 
-
 enum
 {
-    IVL_SIM_LANES = 8 ///< rollouts that are stepped together
+    IVL_SIM_LANES = 8  ///< rollouts that are stepped together
 };
 
 /// One number of each of eight rollouts.  Every operation acts on each lane alone, so a lane's bits do not depend on its
 /// neighbours, and the same source serves registers of any width.
-typedef double ivl_wide_t __attribute__((vector_size(8 * IVL_SIM_LANES)));
-typedef int64_t ivl_mask_t __attribute__((vector_size(8 * IVL_SIM_LANES))); ///< comparison: all bits set, or none
+typedef double  ivl_wide_t __attribute__((vector_size(8 * IVL_SIM_LANES)));
+typedef int64_t ivl_mask_t __attribute__((vector_size(8 * IVL_SIM_LANES)));  ///< comparison: all bits set, or none
 
 typedef struct
 {
@@ -95,7 +94,7 @@ IVL_SIM_INLINE ivl_rot_t ivl_rot_from_quat(const double q[4])
     const double x = q[0], y = q[1], z = q[2], w = q[3];
     const double s = 2.0 / (x * x + y * y + z * z + w * w);
     const double xs = x * s, ys = y * s, zs = z * s;
-    ivl_rot_t R;
+    ivl_rot_t    R;
     R.row[0] = ivl_d3(1.0 - (y * ys + z * zs), x * ys - w * zs, x * zs + w * ys);
     R.row[1] = ivl_d3(x * ys + w * zs, 1.0 - (x * xs + z * zs), y * zs - w * xs);
     R.row[2] = ivl_d3(x * zs - w * ys, y * zs + w * xs, 1.0 - (x * xs + y * ys));
@@ -109,8 +108,7 @@ IVL_SIM_INLINE ivl_d3_t ivl_rot_apply(const ivl_rot_t *R, ivl_d3_t a)
 
 IVL_SIM_INLINE ivl_d3_t ivl_rot_apply_inverse(const ivl_rot_t *R, ivl_d3_t a)
 {
-    return ivl_d3_add(ivl_d3_add(ivl_d3_scale(a.x, R->row[0]), ivl_d3_scale(a.y, R->row[1])),
-                      ivl_d3_scale(a.z, R->row[2]));
+    return ivl_d3_add(ivl_d3_add(ivl_d3_scale(a.x, R->row[0]), ivl_d3_scale(a.y, R->row[1])), ivl_d3_scale(a.z, R->row[2]));
 }
 
 IVL_SIM_INLINE ivl_wide_t ivl_wide(double a)
@@ -217,7 +215,7 @@ IVL_SIM_INLINE ivl_wrot_t ivl_wrot_from_quat(const ivl_wide_t q[4])
     const ivl_wide_t x = q[0], y = q[1], z = q[2], w = q[3];
     const ivl_wide_t s = 2.0 / (x * x + y * y + z * z + w * w);
     const ivl_wide_t xs = x * s, ys = y * s, zs = z * s;
-    ivl_wrot_t R;
+    ivl_wrot_t       R;
     R.row[0] = (ivl_w3_t){1.0 - (y * ys + z * zs), x * ys - w * zs, x * zs + w * ys};
     R.row[1] = (ivl_w3_t){x * ys + w * zs, 1.0 - (x * xs + z * zs), y * zs - w * xs};
     R.row[2] = (ivl_w3_t){x * zs - w * ys, y * zs + w * xs, 1.0 - (x * xs + y * ys)};
@@ -238,26 +236,25 @@ IVL_SIM_INLINE ivl_w3_t ivl_wrot_apply_inverse(const ivl_wrot_t *R, ivl_w3_t a)
 // of the polynomial, the rounding of double comes on top.
 
 /// atan(t) / t as a polynomial in t^2, |t| <= tan(pi/8), error 3.5e-17
-static const double IVL_SIM_ATAN[11] = {
-    0.99999999999999996532,  -0.33333333333328438572,  0.19999999998855110134,  -0.1428571418097646683,
-    0.1111110618045594522,   -0.090907730748084137897, 0.076899534963068577563, -0.066402339304294085887,
-    0.056883492268090104794, -0.043480522157164624777, 0.021135373157693245206};
+static const double IVL_SIM_ATAN[11] = {0.99999999999999996532,   -0.33333333333328438572,  0.19999999998855110134,
+                                        -0.1428571418097646683,   0.1111110618045594522,    -0.090907730748084137897,
+                                        0.076899534963068577563,  -0.066402339304294085887, 0.056883492268090104794,
+                                        -0.043480522157164624777, 0.021135373157693245206};
 /// exp(x), |x| <= ln(2)/2, error 4.2e-18
-static const double IVL_SIM_EXP[12] = {
-    0.99999999999999999693,   0.99999999999999999976,    0.50000000000000183855,   0.16666666666666680806,
-    0.041666666666488095495,  0.0083333333333196006109,  0.0013888888952314774652, 0.00019841269890047113707,
-    2.4801485482328492419e-5, 2.7557240918578969823e-6,  2.7632639639041029749e-7, 2.5110037605963777712e-8};
+static const double IVL_SIM_EXP[12] = {0.99999999999999999693,   0.99999999999999999976,    0.50000000000000183855,
+                                       0.16666666666666680806,   0.041666666666488095495,   0.0083333333333196006109,
+                                       0.0013888888952314774652, 0.00019841269890047113707, 2.4801485482328492419e-5,
+                                       2.7557240918578969823e-6, 2.7632639639041029749e-7,  2.5110037605963777712e-8};
 /// sin(x) / x and cos(x) as polynomials in x^2, |x| <= pi/4, errors 3.2e-18 and 3.0e-20
-static const double IVL_SIM_SIN[7] = {0.99999999999999999685,    -0.16666666666666616666,   0.0083333333333203624567,
+static const double IVL_SIM_SIN[7] = {0.99999999999999999685,     -0.16666666666666616666,  0.0083333333333203624567,
                                       -0.00019841269828650300013, 2.7557313376400129128e-6, -2.5050716974102745028e-8,
                                       1.5894736651849095259e-10};
-static const double IVL_SIM_COS[8] = {0.99999999999999999997,   -0.49999999999999999371,   0.041666666666666452389,
-                                      -0.0013888888888861094596, 2.4801587283881153004e-5, -2.7557313097790086271e-7,
+static const double IVL_SIM_COS[8] = {0.99999999999999999997,    -0.49999999999999999371,   0.041666666666666452389,
+                                      -0.0013888888888861094596, 2.4801587283881153004e-5,  -2.7557313097790086271e-7,
                                       2.0875582380663953044e-9,  -1.1353379638297574126e-11};
 /// atanh(s) / s as a polynomial in s^2, |s| <= (sqrt 2 - 1)/(sqrt 2 + 1), error 1.2e-18
-static const double IVL_SIM_ATANH[8] = {0.99999999999999999887, 0.33333333333333822829, 0.19999999999651169056,
-                                        0.14285714380320839941, 0.11111098528363023304, 0.090918158401146644019,
-                                        0.07656264074182095483, 0.074048551803276383491};
+static const double IVL_SIM_ATANH[8] = {0.99999999999999999887, 0.33333333333333822829,  0.19999999999651169056, 0.14285714380320839941,
+                                        0.11111098528363023304, 0.090918158401146644019, 0.07656264074182095483, 0.074048551803276383491};
 
 /// An angle whose arcus tangent is still to be taken: atan2 up to its one division, num / den in [-0.42, 0.42].
 typedef struct
@@ -271,7 +268,7 @@ IVL_SIM_INLINE ivl_angle_t ivl_wide_fold(ivl_wide_t s, ivl_wide_t c)
 {
     const ivl_wide_t zero = ivl_wide(0.0);
     const ivl_wide_t abs_s = ivl_wide_abs(s), abs_c = ivl_wide_abs(c);
-    ivl_angle_t a;
+    ivl_angle_t      a;
     a.swap = abs_s > abs_c;
     a.mirror = c < zero;
     a.negative = s < zero;
@@ -288,7 +285,7 @@ IVL_SIM_INLINE ivl_angle_t ivl_wide_fold(ivl_wide_t s, ivl_wide_t c)
 IVL_SIM_INLINE ivl_wide_t ivl_wide_unfold(const ivl_angle_t *a, ivl_wide_t t)
 {
     const ivl_wide_t u = t * t;
-    ivl_wide_t p = ivl_wide(IVL_SIM_ATAN[10]);
+    ivl_wide_t       p = ivl_wide(IVL_SIM_ATAN[10]);
     IVL_SIM_UNROLL
     for (int k = 9; k >= 0; k--)
     {
@@ -326,13 +323,13 @@ IVL_SIM_INLINE double ivl_sim_polynomial(const double *coefficient, int n, doubl
 IVL_SIM_INLINE void ivl_sim_sincos(double x, double *sine, double *cosine)
 {
     // x = n pi/2 + r with pi/2 in two parts (Cody-Waite), the first with 30 significant bits so that n times it is exact
-    const double n = floor(x * (2.0 / IVL_SIM_PI) + 0.5);
-    const double r = (x - n * 1.57079632673412561417e+00) - n * 6.07710050650619224932e-11;
-    const double u = r * r;
-    const double s = r * ivl_sim_polynomial(IVL_SIM_SIN, 7, u);
-    const double c = ivl_sim_polynomial(IVL_SIM_COS, 8, u);
+    const double  n = floor(x * (2.0 / IVL_SIM_PI) + 0.5);
+    const double  r = (x - n * 1.57079632673412561417e+00) - n * 6.07710050650619224932e-11;
+    const double  u = r * r;
+    const double  s = r * ivl_sim_polynomial(IVL_SIM_SIN, 7, u);
+    const double  c = ivl_sim_polynomial(IVL_SIM_COS, 8, u);
     const int64_t quadrant = (int64_t)n & 3;
-    const double a = (quadrant & 1) ? c : s, b = (quadrant & 1) ? s : c;
+    const double  a = (quadrant & 1) ? c : s, b = (quadrant & 1) ? s : c;
     *sine = (quadrant & 2) ? -a : a;
     *cosine = (quadrant == 1 || quadrant == 2) ? -b : b;
 }
@@ -344,10 +341,10 @@ IVL_SIM_INLINE double ivl_sim_exp(double x)
     {
         return 0.0;
     }
-    const double n = floor(x * 1.44269504088896340736 + 0.5);
-    const double r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
+    const double   n = floor(x * 1.44269504088896340736 + 0.5);
+    const double   r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
     const uint64_t bits = (uint64_t)((int64_t)n + 1023) << 52;
-    double power;
+    double         power;
     memcpy(&power, &bits, sizeof power);
     return power * ivl_sim_polynomial(IVL_SIM_EXP, 12, r);
 }
@@ -370,4 +367,4 @@ IVL_SIM_INLINE double ivl_sim_log(double x)
     return e * 0.69314718055994530942 + 2.0 * s * ivl_sim_polynomial(IVL_SIM_ATANH, 8, s * s);
 }
 
-#endif // IVL_SIM_MATH_H
+#endif  // IVL_SIM_MATH_H

@@ -5,7 +5,7 @@
 typedef struct
 {
     const char *name, *unit;
-    double lo, hi;
+    double      lo, hi;
 } range_t;
 
 #define RANGE(group, name, suffix, unit, lo, hi, dflt, doc) {#group "." #name, unit, lo, hi},
@@ -21,8 +21,7 @@ static bool in_range(const ivl_sim_params_t *raw, char *error, size_t error_size
         // positive form: NaN is refused
         if (!(value[i] >= r->lo && value[i] <= r->hi))
         {
-            snprintf(error, error_size, "%s: %g is outside the allowed range %g .. %g %s", r->name, value[i], r->lo, r->hi,
-                     r->unit);
+            snprintf(error, error_size, "%s: %g is outside the allowed range %g .. %g %s", r->name, value[i], r->lo, r->hi, r->unit);
             return false;
         }
     }
@@ -38,8 +37,8 @@ static const double SPIN[4] = {-1.0, 1.0, -1.0, 1.0};
 static void derive_legs(ivl_sim_model_t *model)
 {
     const ivl_sim_params_t *raw = &model->raw;
-    ivl_sim_leg_model_t *leg = &model->leg;
-    double sin_psi, cos_psi;
+    ivl_sim_leg_model_t    *leg = &model->leg;
+    double                  sin_psi, cos_psi;
     ivl_sim_sincos(raw->leg_angle_deg * (IVL_SIM_PI / 180.0), &sin_psi, &cos_psi);
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
@@ -70,8 +69,7 @@ static void derive_plate(ivl_sim_plate_t *plate, double size_x, double size_y, d
     plate->center_z_m = center_z;
     for (int i = 0; i < IVL_SIM_CORNERS; i++)
     {
-        plate->corner_B_m[i] = ivl_d3((i & 1) ? plate->half_m[0] : -plate->half_m[0],
-                                      (i & 2) ? plate->half_m[1] : -plate->half_m[1],
+        plate->corner_B_m[i] = ivl_d3((i & 1) ? plate->half_m[0] : -plate->half_m[0], (i & 2) ? plate->half_m[1] : -plate->half_m[1],
                                       center_z + ((i & 4) ? plate->half_m[2] : -plate->half_m[2]));
     }
 }
@@ -79,13 +77,13 @@ static void derive_plate(ivl_sim_plate_t *plate, double size_x, double size_y, d
 static double reach(const ivl_sim_model_t *model)
 {
     const ivl_d3_t hip = model->leg.hip_B_m[0];
-    double farthest = sqrt(ivl_d3_dot(hip, hip)) + model->raw.leg_length_m + model->raw.leg_foot_radius_m;
+    double         farthest = sqrt(ivl_d3_dot(hip, hip)) + model->raw.leg_length_m + model->raw.leg_foot_radius_m;
     for (int p = 0; p < IVL_SIM_PLATES; p++)
     {
         for (int i = 0; i < IVL_SIM_CORNERS; i++)
         {
             const ivl_d3_t corner = model->plate[p].corner_B_m[i];
-            const double distance = sqrt(ivl_d3_dot(corner, corner));
+            const double   distance = sqrt(ivl_d3_dot(corner, corner));
             farthest = (distance > farthest) ? distance : farthest;
         }
     }
@@ -96,7 +94,7 @@ static double reach(const ivl_sim_model_t *model)
 static void tell_firmware(ivl_sim_model_t *model)
 {
     const ivl_sim_params_t *raw = &model->raw;
-    ivl_cfg_t *cfg = &model->firmware;
+    ivl_cfg_t              *cfg = &model->firmware;
     cfg->mass_kg = (float)model->mass_total_kg;
     cfg->jxx_kgm2 = (float)raw->body_inertia_xx_kgm2;
     cfg->jyy_kgm2 = (float)raw->body_inertia_yy_kgm2;
@@ -109,8 +107,7 @@ static void tell_firmware(ivl_sim_model_t *model)
     cfg->h_ceil_m = (float)(raw->world_ceiling_height_m + raw->world_sensed_gap_offset_m);
 }
 
-bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, const ivl_cfg_t *firmware, char *error,
-                        size_t error_size)
+bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, const ivl_cfg_t *firmware, char *error, size_t error_size)
 {
     if (!in_range(raw, error, error_size))
     {
@@ -121,10 +118,10 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
     model->firmware = *firmware;
     model->core = ivl_sim_core_linked;
     derive_legs(model);
-    derive_plate(&model->plate[IVL_SIM_PROP_PLATE], raw->prop_plate_size_x_m, raw->prop_plate_size_y_m,
-                 raw->prop_plate_size_z_m, raw->prop_plate_center_z_m);
-    derive_plate(&model->plate[IVL_SIM_BASE_PLATE], raw->base_plate_size_x_m, raw->base_plate_size_y_m,
-                 raw->base_plate_size_z_m, raw->base_plate_center_z_m);
+    derive_plate(&model->plate[IVL_SIM_PROP_PLATE], raw->prop_plate_size_x_m, raw->prop_plate_size_y_m, raw->prop_plate_size_z_m,
+                 raw->prop_plate_center_z_m);
+    derive_plate(&model->plate[IVL_SIM_BASE_PLATE], raw->base_plate_size_x_m, raw->base_plate_size_y_m, raw->base_plate_size_z_m,
+                 raw->base_plate_center_z_m);
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
         model->rotor_x_m[i] = SIGN_X[i] * raw->rotor_x_m;
@@ -133,8 +130,8 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
     }
     model->mass_total_kg = raw->body_mass_kg + IVL_SIM_LEGS * (raw->leg_mass_kg + raw->leg_foot_mass_kg);
     model->rotor_speed_max_radps = sqrt(raw->rotor_thrust_max_N / raw->rotor_thrust_constant_Ns2);
-    model->rotor_speed_hover_radps = sqrt(model->mass_total_kg * raw->world_gravity_mps2 /
-                                          (IVL_SIM_MOTORS * raw->rotor_thrust_constant_Ns2));
+    model->rotor_speed_hover_radps =
+        sqrt(model->mass_total_kg * raw->world_gravity_mps2 / (IVL_SIM_MOTORS * raw->rotor_thrust_constant_Ns2));
     model->reach_m = reach(model);
     tell_firmware(model);
     if (ivl_cfg_check(&model->firmware) != IVL_OK)

@@ -18,7 +18,7 @@ enum
 {
     IVL_SIM_LEGS = 4,
     IVL_SIM_MOTORS = 4,
-    IVL_SIM_CORNERS = 8, ///< of a plate
+    IVL_SIM_CORNERS = 8,  ///< of a plate
     IVL_SIM_PLATES = 2,
     IVL_SIM_PROP_PLATE = 0,
     IVL_SIM_BASE_PLATE = 1,
@@ -27,47 +27,46 @@ enum
 typedef struct
 {
     ivl_d3_t corner_B_m[IVL_SIM_CORNERS];
-    double half_m[3]; ///< half sizes
-    double center_z_m;
+    double   half_m[3];  ///< half sizes
+    double   center_z_m;
 } ivl_sim_plate_t;
 
 /// A leg is a uniform rod between two nodes, hip and foot; its mass matrix is that of the linear rod element, exact for a
 /// rigid rod: kinetic energy = (hip v_h^2 + 2 cross v_h.v_f + foot v_f^2) / 2.              [MODEL eq. 4.1]
 typedef struct
 {
-    ivl_d3_t hip_B_m[IVL_SIM_LEGS];    ///< pivots
-    ivl_d3_t rest_B[IVL_SIM_LEGS];     ///< unit vector of the leg at rest
-    ivl_d3_t inplane_B[IVL_SIM_LEGS];  ///< unit vector in the leg's vertical plane, direction of growing psi
-    ivl_d3_t sideways_B[IVL_SIM_LEGS]; ///< unit vector across that plane, axis of the first hinge
-    double mass_hip_kg;      ///< m / 3
-    double mass_cross_kg;    ///< m / 6
-    double mass_foot_kg;     ///< m / 3 + foot
-    double weight_hip_kg;    ///< m / 2: share of the weight that acts at the hip
-    double weight_foot_kg;   ///< m / 2 + foot
-    double moment_pivot_kgm2; ///< moment of inertia about the hip
+    ivl_d3_t hip_B_m[IVL_SIM_LEGS];     ///< pivots
+    ivl_d3_t rest_B[IVL_SIM_LEGS];      ///< unit vector of the leg at rest
+    ivl_d3_t inplane_B[IVL_SIM_LEGS];   ///< unit vector in the leg's vertical plane, direction of growing psi
+    ivl_d3_t sideways_B[IVL_SIM_LEGS];  ///< unit vector across that plane, axis of the first hinge
+    double   mass_hip_kg;               ///< m / 3
+    double   mass_cross_kg;             ///< m / 6
+    double   mass_foot_kg;              ///< m / 3 + foot
+    double   weight_hip_kg;             ///< m / 2: share of the weight that acts at the hip
+    double   weight_foot_kg;            ///< m / 2 + foot
+    double   moment_pivot_kgm2;         ///< moment of inertia about the hip
 } ivl_sim_leg_model_t;
 
 typedef struct
 {
-    ivl_sim_params_t raw;
+    ivl_sim_params_t    raw;
     ivl_sim_leg_model_t leg;
-    ivl_sim_plate_t plate[IVL_SIM_PLATES];
-    double rotor_x_m[IVL_SIM_MOTORS], rotor_y_m[IVL_SIM_MOTORS], rotor_spin[IVL_SIM_MOTORS]; ///< spin: sign of the torque on B
-    double mass_total_kg;
-    double rotor_speed_max_radps;
-    double rotor_speed_hover_radps;
-    double leg_frequency_radps; ///< of a leg swinging about its hip, body held
-    double leg_damping_ratio;
-    double reach_m; ///< largest distance of any point of the vehicle from the body origin
-    ivl_cfg_t firmware;
-    double tick_s; ///< of the firmware
-    ivl_sim_core_t core; ///< where the firmware runs
+    ivl_sim_plate_t     plate[IVL_SIM_PLATES];
+    double         rotor_x_m[IVL_SIM_MOTORS], rotor_y_m[IVL_SIM_MOTORS], rotor_spin[IVL_SIM_MOTORS];  ///< spin: sign of the torque on B
+    double         mass_total_kg;
+    double         rotor_speed_max_radps;
+    double         rotor_speed_hover_radps;
+    double         leg_frequency_radps;  ///< of a leg swinging about its hip, body held
+    double         leg_damping_ratio;
+    double         reach_m;  ///< largest distance of any point of the vehicle from the body origin
+    ivl_cfg_t      firmware;
+    double         tick_s;  ///< of the firmware
+    ivl_sim_core_t core;    ///< where the firmware runs
 } ivl_sim_model_t;
 
 /// Checks raw parameters and derives the model.
 /// @param[in] firmware  flight parameters; those that describe the vehicle and the ceiling are overwritten from `raw`
 /// @param[out] error    one line naming the parameter, its value and the allowed range, if the result is false
-bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, const ivl_cfg_t *firmware, char *error,
-                        size_t error_size);
+bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, const ivl_cfg_t *firmware, char *error, size_t error_size);
 
-#endif // IVL_SIM_MODEL_H
+#endif  // IVL_SIM_MODEL_H

@@ -9,7 +9,7 @@
 
 #include <math.h>
 
-#define IVL_SIM_REQUIRED ((double)NAN)
+#define IVL_SIM_REQUIRED  ((double)NAN)
 #define IVL_SIM_UNLIMITED ((double)INFINITY)
 
 // clang-format off
@@ -82,7 +82,7 @@
     X(step, scale, norm, "1", 0.001, 1.0, 1.0, "multiplies all steps; for convergence studies")
 // clang-format on
 
-#define IVL_SIM_FIELD(group, name, suffix, unit, lo, hi, dflt, doc) double group##_##name##_##suffix; ///< doc
+#define IVL_SIM_FIELD(group, name, suffix, unit, lo, hi, dflt, doc) double group##_##name##_##suffix;  ///< doc
 
 /// Raw parameters, in the order of the table.
 typedef struct
@@ -92,4 +92,4 @@ typedef struct
 
 #undef IVL_SIM_FIELD
 
-#endif // IVL_SIM_PARAMS_H
+#endif  // IVL_SIM_PARAMS_H

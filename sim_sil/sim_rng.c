@@ -6,8 +6,7 @@ static void philox_round(uint32_t c[4], const uint32_t k[2])
 {
     const uint64_t p0 = (uint64_t)0xD2511F53u * c[0];
     const uint64_t p1 = (uint64_t)0xCD9E8D57u * c[2];
-    const uint32_t next[4] = {(uint32_t)(p1 >> 32) ^ c[1] ^ k[0], (uint32_t)p1, (uint32_t)(p0 >> 32) ^ c[3] ^ k[1],
-                              (uint32_t)p0};
+    const uint32_t next[4] = {(uint32_t)(p1 >> 32) ^ c[1] ^ k[0], (uint32_t)p1, (uint32_t)(p0 >> 32) ^ c[3] ^ k[1], (uint32_t)p0};
     memcpy(c, next, sizeof next);
 }
 
@@ -51,7 +50,7 @@ void ivl_sim_normal4(const ivl_sim_rng_t *rng, ivl_sim_draw_t purpose, uint32_t 
     for (int pair = 0; pair < 2; pair++)
     {
         const double radius = sqrt(-2.0 * ivl_sim_log(to_uniform(bits[2 * pair])));
-        double s, c;
+        double       s, c;
         ivl_sim_sincos(2.0 * IVL_SIM_PI * to_uniform(bits[2 * pair + 1]), &s, &c);
         out[2 * pair] = radius * c;
         out[2 * pair + 1] = radius * s;

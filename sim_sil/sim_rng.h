@@ -11,19 +11,19 @@
 /// What a draw is for; each purpose has its own, independent sequence.
 typedef enum
 {
-    IVL_SIM_DRAW_SENSOR_PHASE, ///< offset of the pose sensor's clock
-    IVL_SIM_DRAW_POSITION,     ///< pose sensor, position noise
-    IVL_SIM_DRAW_VELOCITY,     ///< pose sensor, velocity noise
-    IVL_SIM_DRAW_ATTITUDE,     ///< attitude noise
-    IVL_SIM_DRAW_GYRO,         ///< gyro noise
-    IVL_SIM_DRAW_ACCEL,        ///< accelerometer noise
-    IVL_SIM_DRAW_THRUST,       ///< per-motor scatter of the thrust constant
+    IVL_SIM_DRAW_SENSOR_PHASE,  ///< offset of the pose sensor's clock
+    IVL_SIM_DRAW_POSITION,      ///< pose sensor, position noise
+    IVL_SIM_DRAW_VELOCITY,      ///< pose sensor, velocity noise
+    IVL_SIM_DRAW_ATTITUDE,      ///< attitude noise
+    IVL_SIM_DRAW_GYRO,          ///< gyro noise
+    IVL_SIM_DRAW_ACCEL,         ///< accelerometer noise
+    IVL_SIM_DRAW_THRUST,        ///< per-motor scatter of the thrust constant
 } ivl_sim_draw_t;
 
 typedef struct
 {
-    uint64_t seed;   ///< of the batch
-    uint64_t stream; ///< of the rollout in the batch
+    uint64_t seed;    ///< of the batch
+    uint64_t stream;  ///< of the rollout in the batch
 } ivl_sim_rng_t;
 
 /// The Philox4x32-10 block function, as published.
@@ -35,4 +35,4 @@ double ivl_sim_uniform(const ivl_sim_rng_t *rng, ivl_sim_draw_t purpose, uint32_
 /// Four standard normal numbers (two Box-Muller pairs).
 void ivl_sim_normal4(const ivl_sim_rng_t *rng, ivl_sim_draw_t purpose, uint32_t index, double out[4]);
 
-#endif // IVL_SIM_RNG_H
+#endif  // IVL_SIM_RNG_H

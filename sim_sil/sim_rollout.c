@@ -15,8 +15,7 @@ static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t 
     switch ((ivl_sim_start_t)spec->start[0])
     {
     case IVL_SIM_START_FLOWN:
-        return sin_angle * (0.5 * speed * speed / (double)model->firmware.approach_accel_mps2 +
-                            speed * model->raw.start_hold_time_s);
+        return sin_angle * (0.5 * speed * speed / (double)model->firmware.approach_accel_mps2 + speed * model->raw.start_hold_time_s);
     case IVL_SIM_START_AT_TRIGGER:
         return spec->d_ceil_m[0];
     case IVL_SIM_START_IMPARTED:
@@ -38,29 +37,28 @@ static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], 
 static bool start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec)
 {
     const ivl_sim_model_t *model = group->model;
-    ivl_sim_world_t *world = &group->world[lane];
-    double sin_angle, cos_angle;
+    ivl_sim_world_t       *world = &group->world[lane];
+    double                 sin_angle, cos_angle;
     ivl_sim_sincos(spec->angle_deg[0] * (IVL_SIM_PI / 180.0), &sin_angle, &cos_angle);
-    const double plane = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m;
-    const double speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : spec->speed_mps[0];
-    const double p[3] = {0.0, 0.0, plane - start_distance(model, spec, sin_angle)};
-    const double v[3] = {speed * cos_angle, 0.0, speed * sin_angle};
+    const double        plane = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m;
+    const double        speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : spec->speed_mps[0];
+    const double        p[3] = {0.0, 0.0, plane - start_distance(model, spec, sin_angle)};
+    const double        v[3] = {speed * cos_angle, 0.0, speed * sin_angle};
     const ivl_sim_rng_t rng = {spec->seed[0], spec->stream[0]};
     ivl_sim_world_start(group, lane, &rng, p, v);
     request_approach(spec, p, &world->in.cmd);
-    const bool at_once = spec->start[0] == IVL_SIM_START_AT_TRIGGER;
-    const ivl_policy_t policy = {.seq = 1,
-                                 .rrev_c_per_s = at_once ? 0.0f : (float)spec->rrev_c_per_s[0],
-                                 .moment_y_Nm = (float)(spec->moment_y_Nmm[0] * 1.0e-3)};
+    const bool         at_once = spec->start[0] == IVL_SIM_START_AT_TRIGGER;
+    const ivl_policy_t policy = {
+        .seq = 1, .rrev_c_per_s = at_once ? 0.0f : (float)spec->rrev_c_per_s[0], .moment_y_Nm = (float)(spec->moment_y_Nmm[0] * 1.0e-3)};
     return model->core.commit(group->port, lane, &model->firmware, &world->firmware, &policy) == IVL_OK;
 }
 
 static void clear(ivl_sim_outcome_t *o)
 {
     memset(o, 0, sizeof *o);
-    double *const fields[] = {o->t_trigger_s,   o->t_impact_s,    o->t_end_s,      o->theta_impact_deg,  o->vx_trigger_mps,
-                              o->vz_trigger_mps, o->rate_trigger_radps, o->vx_impact_mps, o->vz_impact_mps,
-                              o->rate_impact_radps, o->d_trigger_m, o->rrev_trigger, o->of_y_trigger, o->d_min_m};
+    double *const fields[] = {o->t_trigger_s,    o->t_impact_s,         o->t_end_s,       o->theta_impact_deg, o->vx_trigger_mps,
+                              o->vz_trigger_mps, o->rate_trigger_radps, o->vx_impact_mps, o->vz_impact_mps,    o->rate_impact_radps,
+                              o->d_trigger_m,    o->rrev_trigger,       o->of_y_trigger,  o->d_min_m};
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
     {
         fields[i][0] = (double)NAN;
@@ -84,8 +82,8 @@ static void note_trigger(const ivl_sim_kin_t *before, double t_s, const ivl_stat
 static double pitch_deg(const ivl_sim_kin_t *kin)
 {
     const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
-    const double angle = ivl_sim_atan2(R.row[2].x, R.row[0].x);
-    const double turns = floor((kin->pitch_rad - angle) / (2.0 * IVL_SIM_PI) + 0.5);
+    const double    angle = ivl_sim_atan2(R.row[2].x, R.row[0].x);
+    const double    turns = floor((kin->pitch_rad - angle) / (2.0 * IVL_SIM_PI) + 0.5);
     return (angle + 2.0 * IVL_SIM_PI * turns) * (180.0 / IVL_SIM_PI);
 }
 
@@ -126,9 +124,9 @@ static bool out_of_reach(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
 
 static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_t *o, ivl_sim_end_t *end)
 {
-    const ivl_sim_world_t *world = &group->world[lane];
+    const ivl_sim_world_t  *world = &group->world[lane];
     const ivl_sim_params_t *raw = &world->model->raw;
-    const double slack = 1.0e-9;
+    const double            slack = 1.0e-9;
     if (ivl_sim_world_diverged(&group->state, lane))
     {
         *end = IVL_SIM_END_NOT_FINITE;
@@ -257,8 +255,8 @@ static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t sou
 void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
 {
     ivl_sim_group_t group;
-    ivl_sim_job_t job[IVL_SIM_LANES];
-    bool any = false;
+    ivl_sim_job_t   job[IVL_SIM_LANES];
+    bool            any = false;
     ivl_sim_group_init(model, &group);
     group.port = model->core.open(model->core.context);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)

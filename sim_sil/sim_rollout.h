@@ -7,20 +7,20 @@
 
 typedef enum
 {
-    IVL_SIM_START_IMPARTED,   ///< level, at the approach velocity, V_z * 1 s below the ceiling (RREV = 1)
-    IVL_SIM_START_FLOWN,      ///< hovering, far enough to reach the speed and hold it for start.hold_time
-    IVL_SIM_START_AT_TRIGGER, ///< level, at the approach velocity, at a stated distance; the flip starts at once
+    IVL_SIM_START_IMPARTED,    ///< level, at the approach velocity, V_z * 1 s below the ceiling (RREV = 1)
+    IVL_SIM_START_FLOWN,       ///< hovering, far enough to reach the speed and hold it for start.hold_time
+    IVL_SIM_START_AT_TRIGGER,  ///< level, at the approach velocity, at a stated distance; the flip starts at once
     IVL_SIM_START_COUNT
 } ivl_sim_start_t;
 
 typedef enum
 {
-    IVL_SIM_END_CONTACT_TIME, ///< end.contact_time after the first contact
-    IVL_SIM_END_MISSED,       ///< motors cut, and too slow to reach the ceiling any more
-    IVL_SIM_END_MISSED_TIME,  ///< end.missed_time after the trigger, without a contact
-    IVL_SIM_END_TIME_MAX,     ///< end.time_max after the start
-    IVL_SIM_END_REFUSED,      ///< the flight core refused the policy
-    IVL_SIM_END_NOT_FINITE,   ///< the state ceased to be finite: a defect, or absurd parameters
+    IVL_SIM_END_CONTACT_TIME,  ///< end.contact_time after the first contact
+    IVL_SIM_END_MISSED,        ///< motors cut, and too slow to reach the ceiling any more
+    IVL_SIM_END_MISSED_TIME,   ///< end.missed_time after the trigger, without a contact
+    IVL_SIM_END_TIME_MAX,      ///< end.time_max after the start
+    IVL_SIM_END_REFUSED,       ///< the flight core refused the policy
+    IVL_SIM_END_NOT_FINITE,    ///< the state ceased to be finite: a defect, or absurd parameters
     IVL_SIM_END_COUNT
 } ivl_sim_end_t;
 
@@ -99,18 +99,18 @@ typedef struct
 /// Receives a row after the start and then every period, up to the end.
 typedef struct
 {
-    double period_s;
+    double           period_s;
     ivl_sim_trace_t *rows;
-    size_t capacity; ///< of `rows`
-    size_t n;        ///< rows that the landing has; those beyond the capacity are counted, not written
+    size_t           capacity;  ///< of `rows`
+    size_t           n;         ///< rows that the landing has; those beyond the capacity are counted, not written
 } ivl_sim_tracer_t;
 
 /// One landing to fly, and where its result goes.
 typedef struct
 {
     const ivl_sim_spec_t *spec;
-    ivl_sim_outcome_t *outcome;
-    ivl_sim_tracer_t *tracer; ///< NULL for none
+    ivl_sim_outcome_t    *outcome;
+    ivl_sim_tracer_t     *tracer;  ///< NULL for none
 } ivl_sim_job_t;
 
 /// Gives the next landing to fly; false when there are no more.
@@ -122,4 +122,4 @@ void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *co
 /// Lower-case name of an end, "?" for a number that is none.
 const char *ivl_sim_end_name(int end);
 
-#endif // IVL_SIM_ROLLOUT_H
+#endif  // IVL_SIM_ROLLOUT_H

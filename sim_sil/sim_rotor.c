@@ -33,19 +33,18 @@ static double spin(const ivl_sim_rotor_t *rotor, double *speed, double command)
     const double decay = (gap < 0.0) ? rotor->decay_up : rotor->decay_down;
     const double share = (gap < 0.0) ? rotor->share_up : rotor->share_down;
     *speed = command + gap * decay;
-    return command * command + 2.0 * command * gap * share * (1.0 - decay) +
-           0.5 * gap * gap * share * (1.0 - decay * decay);
+    return command * command + 2.0 * command * gap * share * (1.0 - decay) + 0.5 * gap * gap * share * (1.0 - decay * decay);
 }
 
 /// Thrust gain near the ceiling, for an upright rotor.                                           [MODEL eq. 2.5]
 static double ceiling_effect(const ivl_sim_model_t *model, double height_m, const double q_WB[4])
 {
     const ivl_sim_params_t *raw = &model->raw;
-    const ivl_rot_t R = ivl_rot_from_quat(q_WB);
-    const double gap = raw->world_ceiling_height_m - height_m - R.row[2].z * raw->rotor_z_m;
-    const double least = 0.5 * raw->aero_rotor_radius_m;
-    const double ratio = raw->aero_rotor_radius_m / ((gap > least) ? gap : least);
-    const double upright = (R.row[2].z > 0.0) ? R.row[2].z : 0.0;
+    const ivl_rot_t         R = ivl_rot_from_quat(q_WB);
+    const double            gap = raw->world_ceiling_height_m - height_m - R.row[2].z * raw->rotor_z_m;
+    const double            least = 0.5 * raw->aero_rotor_radius_m;
+    const double            ratio = raw->aero_rotor_radius_m / ((gap > least) ? gap : least);
+    const double            upright = (R.row[2].z > 0.0) ? R.row[2].z : 0.0;
     return 1.0 + raw->aero_ceiling_gain_norm * upright * ratio * ratio;
 }
 
@@ -59,18 +58,18 @@ bool ivl_sim_rotor_still(const ivl_sim_rotor_t *rotor)
     return !(most > 0.0);
 }
 
-ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m,
-                                    const double q_WB[4], double dt_s)
+ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m, const double q_WB[4],
+                                    double dt_s)
 {
     const ivl_sim_params_t *raw = &model->raw;
-    ivl_sim_thrust_t load = {0.0, {0.0, 0.0, 0.0}};
+    ivl_sim_thrust_t        load = {0.0, {0.0, 0.0, 0.0}};
     if (ivl_sim_rotor_still(rotor))
     {
         return load;
     }
     if (!(dt_s > 0.0))
     {
-        dt_s = 1.0e-9; // an evaluation without motion: the thrust of this instant
+        dt_s = 1.0e-9;  // an evaluation without motion: the thrust of this instant
     }
     if (fabs(rotor->dt_s - dt_s) > 0.0)
     {

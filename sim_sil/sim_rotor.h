@@ -8,7 +8,7 @@
 /// Force and moment on the body, mean of one step.
 typedef struct
 {
-    double thrust_N; ///< along body z
+    double thrust_N;  ///< along body z
     double torque_B_Nm[3];
 } ivl_sim_thrust_t;
 
@@ -16,11 +16,11 @@ typedef struct
 {
     double speed_radps[IVL_SIM_MOTORS];
     double command_radps[IVL_SIM_MOTORS];
-    double scatter[IVL_SIM_MOTORS];    ///< factor on each thrust, 1 without scatter
+    double scatter[IVL_SIM_MOTORS];  ///< factor on each thrust, 1 without scatter
     // of the last step: most steps are alike
     double dt_s;
-    double decay_up, decay_down; ///< exp(-dt/tau)
-    double share_up, share_down; ///< tau/dt
+    double decay_up, decay_down;  ///< exp(-dt/tau)
+    double share_up, share_down;  ///< tau/dt
 } ivl_sim_rotor_t;
 
 /// Rotors that hover, and stay there.
@@ -34,7 +34,7 @@ bool ivl_sim_rotor_still(const ivl_sim_rotor_t *rotor);
 
 /// Advances the rotors by dt and returns force and moment, each averaged over dt exactly.        [MODEL eq. 2.3, 2.4]
 /// @param[in] height_m, q_WB  of the body at the start of the step, for the ceiling effect
-ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m,
-                                    const double q_WB[4], double dt_s);
+ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m, const double q_WB[4],
+                                    double dt_s);
 
-#endif // IVL_SIM_ROTOR_H
+#endif  // IVL_SIM_ROTOR_H

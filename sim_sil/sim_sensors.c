@@ -44,8 +44,8 @@ static void clip(double most, double a[3])
 }
 
 /// Takes the sample that fell due `age_s` ago, from the present state: exact for constant acceleration.
-static void take_pose(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
-                      const double a_W_mps2[3], double age_s, ivl_sim_sensors_t *sensors)
+static void take_pose(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, const double a_W_mps2[3],
+                      double age_s, ivl_sim_sensors_t *sensors)
 {
     ivl_sim_pose_t *pose = &sensors->queue[sensors->n_taken % IVL_SIM_POSE_QUEUE];
     pose->t_s = sensors->next_s;
@@ -74,12 +74,10 @@ static void deliver(const ivl_sim_model_t *model, double t_s, ivl_sim_sensors_t 
     }
 }
 
-void ivl_sim_sensors_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
-                          ivl_sim_sensors_t *sensors)
+void ivl_sim_sensors_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, ivl_sim_sensors_t *sensors)
 {
     const double period = 1.0 / model->raw.sense_pose_rate_hz;
-    const double phase =
-        model->raw.sense_phase_random_norm * ivl_sim_uniform(rng, IVL_SIM_DRAW_SENSOR_PHASE, 0) * period;
+    const double phase = model->raw.sense_phase_random_norm * ivl_sim_uniform(rng, IVL_SIM_DRAW_SENSOR_PHASE, 0) * period;
     const double still[3] = {0.0, 0.0, 0.0};
     sensors->n_taken = 0;
     sensors->n_delivered = 0;
@@ -98,8 +96,7 @@ void ivl_sim_sensors_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng
     deliver(model, 0.0, sensors);
 }
 
-static void read_attitude(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
-                          uint32_t tick, ivl_in_t *in)
+static void read_attitude(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, uint32_t tick, ivl_in_t *in)
 {
     const double *q = state->q_WB;
     if (!(model->raw.sense_attitude_noise_rad > 0.0))
@@ -117,11 +114,11 @@ static void read_attitude(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng
     in->q_WB.w = to_float(s * (q[3] - q[0] * e[0] - q[1] * e[1] - q[2] * e[2]));
 }
 
-static void read_imu(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
-                     ivl_sim_sensors_t *sensors, ivl_in_t *in)
+static void read_imu(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, ivl_sim_sensors_t *sensors,
+                     ivl_in_t *in)
 {
     const ivl_sim_params_t *raw = &model->raw;
-    double gyro[3], accel[3], mean[3] = {0.0, 0.0, raw->world_gravity_mps2};
+    double                  gyro[3], accel[3], mean[3] = {0.0, 0.0, raw->world_gravity_mps2};
     memcpy(gyro, state->w_B_radps, sizeof gyro);
     for (int i = 0; i < 3 && sensors->n_tick > 0; i++)
     {
@@ -138,8 +135,8 @@ static void read_imu(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, con
     in->f_B_mps2 = to_float3(accel);
 }
 
-void ivl_sim_sensors_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state,
-                          const double a_W_mps2[3], double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in)
+void ivl_sim_sensors_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, const double a_W_mps2[3],
+                          double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in)
 {
     while (sensors->next_s <= t_s)
     {

@@ -6,12 +6,12 @@ static const double PLATE_TOLERANCE_M = 1.0e-6;
 // A foot that came off must move this far away before it can stick again.
 static const double REARM_GAP_M = 1.0e-3;
 // A contact that is not located after so many tries is taken where it is: the try before was within a few tolerances.
-static const int LOCATE_MAX = 12;
-static const double NEAR_MARGIN_M = 0.05; // more than a vehicle moves in one step
-static const double FAR_M = 1.0;      // stands for the gap of what cannot make an event
-static const double NO_EVENT = 2.0;   // share of a step, beyond its end
+static const int    LOCATE_MAX = 12;
+static const double NEAR_MARGIN_M = 0.05;  // more than a vehicle moves in one step
+static const double FAR_M = 1.0;           // stands for the gap of what cannot make an event
+static const double NO_EVENT = 2.0;        // share of a step, beyond its end
 static const double TIME_SLACK_S = 1.0e-9;
-static const double TURNS_MAX = 16.0; // what the limit on a step's turn can shorten it by
+static const double TURNS_MAX = 16.0;  // what the limit on a step's turn can shorten it by
 
 // ---- starting -----------------------------------------------------------------------------------------------------------
 
@@ -44,8 +44,7 @@ static void draw_scatter(ivl_sim_world_t *w)
 
 void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group)
 {
-    const ivl_sim_foot_t free_feet[IVL_SIM_LEGS] = {IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE,
-                                                    IVL_SIM_FOOT_FREE};
+    const ivl_sim_foot_t free_feet[IVL_SIM_LEGS] = {IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE};
     memset(group, 0, sizeof *group);
     group->model = model;
     ivl_sim_kin_t resting;
@@ -75,12 +74,11 @@ ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane)
     return kin;
 }
 
-void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3],
-                         const double v_W_mps[3])
+void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3], const double v_W_mps[3])
 {
     const ivl_sim_model_t *model = group->model;
-    ivl_sim_world_t *w = &group->world[lane];
-    ivl_sim_kin_t kin;
+    ivl_sim_world_t       *w = &group->world[lane];
+    ivl_sim_kin_t          kin;
     memset(&kin, 0, sizeof kin);
     memcpy(kin.p_WB_m, p_W_m, sizeof kin.p_WB_m);
     memcpy(kin.v_WB_mps, v_W_mps, sizeof kin.v_WB_mps);
@@ -114,8 +112,8 @@ static ivl_d3_t up_of(const ivl_sim_state_t *s, int lane)
 static void gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double gap[IVL_SIM_GAPS])
 {
     const ivl_sim_params_t *raw = &w->model->raw;
-    const double room = raw->world_ceiling_height_m - s->p_WB_m.z[lane];
-    const bool near = room < w->model->reach_m + NEAR_MARGIN_M;
+    const double            room = raw->world_ceiling_height_m - s->p_WB_m.z[lane];
+    const bool              near = room < w->model->reach_m + NEAR_MARGIN_M;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const bool may_touch = near && (w->foot[i] == IVL_SIM_FOOT_FREE) && !w->detached[i];
@@ -157,7 +155,7 @@ static double first_zero(double g0, double d0, double g1, double d1, double tole
     for (int i = 0; i < 40; i++)
     {
         const double mid = 0.5 * (lo + hi);
-        const bool outside = hermite(g0, d0, g1, d1, mid) > 0.0;
+        const bool   outside = hermite(g0, d0, g1, d1, mid) > 0.0;
         lo = outside ? mid : lo;
         hi = outside ? hi : mid;
     }
@@ -168,9 +166,9 @@ static double first_zero(double g0, double d0, double g1, double d1, double tole
 static double event_share(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t *w = &group->world[lane];
-    const double *g0 = w->trial.gap_m, dt = w->trial.dt_s;
-    double share = NO_EVENT;
-    double *g1 = w->trial.gap_after_m;
+    const double    *g0 = w->trial.gap_m, dt = w->trial.dt_s;
+    double           share = NO_EVENT;
+    double          *g1 = w->trial.gap_after_m;
     gaps(w, &group->next, lane, g1);
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
@@ -219,13 +217,13 @@ static void stop_held_feet(ivl_sim_group_t *group, int lane)
 static double longest_step(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
-    const double most = w->impact.happened ? raw->step_swing_s : raw->step_flight_s;
+    const double            most = w->impact.happened ? raw->step_swing_s : raw->step_flight_s;
     if (ivl_sim_world_count_stuck(w) < IVL_SIM_LEGS)
     {
         return most;
     }
     const ivl_d3_t turn = ivl_d3(most * s->w_B_radps.x[lane], most * s->w_B_radps.y[lane], most * s->w_B_radps.z[lane]);
-    const double square = ivl_d3_dot(turn, turn);
+    const double   square = ivl_d3_dot(turn, turn);
     if (!(square > raw->step_turn_rad * raw->step_turn_rad))
     {
         return most;
@@ -237,8 +235,8 @@ static double longest_step(const ivl_sim_world_t *w, const ivl_sim_state_t *s, i
 static void grade_step(ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, bool event)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
-    const double most = longest_step(w, s, lane) * raw->step_scale_norm;
-    const double next = event ? raw->step_touch_s * raw->step_scale_norm : w->step_s * raw->step_growth_norm;
+    const double            most = longest_step(w, s, lane) * raw->step_scale_norm;
+    const double            next = event ? raw->step_touch_s * raw->step_scale_norm : w->step_s * raw->step_growth_norm;
     w->step_s = (next < most) ? next : most;
 }
 
@@ -246,7 +244,7 @@ static void grade_step(ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, b
 static void handle_touches(ivl_sim_group_t *group, int lane, const double gap[IVL_SIM_GAPS])
 {
     ivl_sim_world_t *w = &group->world[lane];
-    bool event = false, foot_event = false;
+    bool             event = false, foot_event = false;
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
         const bool is_foot = i < IVL_SIM_LEGS;
@@ -284,9 +282,9 @@ static void handle_touches(ivl_sim_group_t *group, int lane, const double gap[IV
 /// @return true if any did: the forces have jumped
 static bool handle_held(ivl_sim_group_t *group, int lane)
 {
-    ivl_sim_world_t *w = &group->world[lane];
+    ivl_sim_world_t        *w = &group->world[lane];
     const ivl_sim_params_t *raw = &w->model->raw;
-    bool event = false;
+    bool                    event = false;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const double pull = group->rate.pull_N[i][lane];
@@ -327,8 +325,8 @@ static bool plates_press(const ivl_sim_rate_t *rate, int lane)
 static double choose_step(const ivl_sim_world_t *w, bool plates, bool any_sliding)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
-    const double plate = raw->step_plate_s * raw->step_scale_norm;
-    double step = (plates && w->step_s > plate) ? plate : w->step_s;
+    const double            plate = raw->step_plate_s * raw->step_scale_norm;
+    double                  step = (plates && w->step_s > plate) ? plate : w->step_s;
     for (int i = 0; i < IVL_SIM_LEGS && any_sliding; i++)
     {
         const double wait = w->t_touch_s[i] + raw->leg_stick_delay_s - w->t_s;
@@ -351,7 +349,7 @@ static void propose(ivl_sim_group_t *group, int lane, double dt)
     if (w->trial.powered)
     {
         const ivl_wide_t *q = group->state.q_WB;
-        const double attitude[4] = {q[0][lane], q[1][lane], q[2][lane], q[3][lane]};
+        const double      attitude[4] = {q[0][lane], q[1][lane], q[2][lane], q[3][lane]};
         w->trial.rotor = w->rotor;
         thrust = ivl_sim_rotor_step(w->model, &w->trial.rotor, group->state.p_WB_m.z[lane], attitude, dt);
     }
@@ -387,7 +385,7 @@ static bool judge(ivl_sim_group_t *group, int lane)
     ivl_sim_world_t *w = &group->world[lane];
     if (handle_held(group, lane))
     {
-        w->trial.n_try = 0; // the forces have jumped: begin again from here
+        w->trial.n_try = 0;  // the forces have jumped: begin again from here
         return false;
     }
     if (w->trial.starting)
@@ -429,7 +427,7 @@ static void accept(ivl_sim_group_t *group, int lane)
     w->n_step++;
     if (ivl_sim_world_diverged(&group->next, lane))
     {
-        w->left_s = 0.0; // steps towards its contacts would shrink for ever: the tick ends here, and with it the landing
+        w->left_s = 0.0;  // steps towards its contacts would shrink for ever: the tick ends here, and with it the landing
     }
     const double d = w->model->raw.world_ceiling_height_m - group->next.p_WB_m.z[lane];
     w->d_min_m = (d < w->d_min_m) ? d : w->d_min_m;
@@ -439,7 +437,7 @@ static void accept(ivl_sim_group_t *group, int lane)
 /// One lane of a struct that is made of wide numbers only.
 static void copy_lane(void *to, const void *from, size_t size, int lane)
 {
-    double *t = to;
+    double       *t = to;
     const double *f = from;
     for (size_t i = (size_t)lane; i < size / sizeof *t; i += IVL_SIM_LANES)
     {
@@ -491,8 +489,7 @@ void ivl_sim_group_step(ivl_sim_group_t *group)
             begin_step(group, lane);
         }
     }
-    ivl_sim_leapfrog(group->model, &group->contact, &group->load, &group->dt_s, &group->state, &group->last, &group->next,
-                     &group->rate);
+    ivl_sim_leapfrog(group->model, &group->contact, &group->load, &group->dt_s, &group->state, &group->last, &group->next, &group->rate);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
         stands[lane] = moving[lane] && judge(group, lane);
@@ -542,7 +539,7 @@ static void body_of(const ivl_sim_state_t *s, int lane, ivl_sim_kin_t *kin)
 
 void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
 {
-    ivl_sim_world_t *w = &group->world[lane];
+    ivl_sim_world_t       *w = &group->world[lane];
     const ivl_sim_model_t *model = w->model;
     // time is a count of ticks, so that it does not drift
     w->t_s = (double)w->n_tick * model->tick_s;
@@ -550,7 +547,7 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
     w->left_s = (double)w->n_tick * model->tick_s - w->t_s;
     if (model->core.every_tick || !ivl_motors_latched_off(&w->firmware))
     {
-        ivl_sim_kin_t kin; // of which sensors need the body's part
+        ivl_sim_kin_t kin;  // of which sensors need the body's part
         body_of(&group->state, lane, &kin);
         const double a[3] = {group->last.a_WB_mps2.x[lane], group->last.a_WB_mps2.y[lane], group->last.a_WB_mps2.z[lane]};
         ivl_sim_sensors_read(model, &w->rng, &kin, a, w->t_s, &w->sensors, &w->in);

@@ -11,74 +11,73 @@
 
 enum
 {
-    IVL_SIM_GAPS = IVL_SIM_LEGS + IVL_SIM_PLATES ///< distances that make an event: feet, then plates
+    IVL_SIM_GAPS = IVL_SIM_LEGS + IVL_SIM_PLATES  ///< distances that make an event: feet, then plates
 };
 
 /// The first contact of any foot or plate with the ceiling, just before it acts.
 typedef struct
 {
-    bool happened;
-    double t_s;
+    bool          happened;
+    double        t_s;
     ivl_sim_kin_t kin;
 } ivl_sim_impact_t;
 
 /// The step that is being tried.
 typedef struct
 {
-    double dt_s;
-    bool powered;          ///< some rotor turns
-    ivl_sim_rotor_t rotor; ///< after the step, if powered
-    double gap_m[IVL_SIM_GAPS];       ///< before the step
-    double gap_after_m[IVL_SIM_GAPS]; ///< after it; before the next
-    int n_try;             ///< 0 at first; more while a contact is being located
-    bool starting;         ///< evaluates only: the forces have jumped
+    double          dt_s;
+    bool            powered;                    ///< some rotor turns
+    ivl_sim_rotor_t rotor;                      ///< after the step, if powered
+    double          gap_m[IVL_SIM_GAPS];        ///< before the step
+    double          gap_after_m[IVL_SIM_GAPS];  ///< after it; before the next
+    int             n_try;                      ///< 0 at first; more while a contact is being located
+    bool            starting;                   ///< evaluates only: the forces have jumped
 } ivl_sim_trial_t;
 
 typedef struct
 {
     const ivl_sim_model_t *model;
-    ivl_sim_rng_t rng;
-    double t_s;
-    double left_s;   ///< of the present tick
-    uint32_t n_tick; ///< ticks of the flight core since the start
-    uint32_t n_step; ///< integration steps since the start
-    double step_s;   ///< next integration step, graded after events
-    bool restart;    ///< the forces have jumped since the last evaluation
-    ivl_sim_foot_t foot[IVL_SIM_LEGS];
-    ivl_sim_trial_t trial;
-    ivl_sim_rotor_t rotor;
-    ivl_sim_sensors_t sensors;
-    ivl_state_t firmware;
-    ivl_in_t in;
-    ivl_out_t out;
-    ivl_sim_impact_t impact;
-    double t_touch_s[IVL_SIM_LEGS];   ///< since when a sliding foot presses
-    bool detached[IVL_SIM_LEGS];      ///< came off; cannot stick again before it has moved away
-    int8_t stuck_order[IVL_SIM_LEGS]; ///< leg numbers 1..4 in the order of first sticking, 0 none
-    int n_order;
-    bool plate_touched[IVL_SIM_PLATES];
-    double d_min_m; ///< smallest distance of the body origin from the ceiling's surface
+    ivl_sim_rng_t          rng;
+    double                 t_s;
+    double                 left_s;   ///< of the present tick
+    uint32_t               n_tick;   ///< ticks of the flight core since the start
+    uint32_t               n_step;   ///< integration steps since the start
+    double                 step_s;   ///< next integration step, graded after events
+    bool                   restart;  ///< the forces have jumped since the last evaluation
+    ivl_sim_foot_t         foot[IVL_SIM_LEGS];
+    ivl_sim_trial_t        trial;
+    ivl_sim_rotor_t        rotor;
+    ivl_sim_sensors_t      sensors;
+    ivl_state_t            firmware;
+    ivl_in_t               in;
+    ivl_out_t              out;
+    ivl_sim_impact_t       impact;
+    double                 t_touch_s[IVL_SIM_LEGS];    ///< since when a sliding foot presses
+    bool                   detached[IVL_SIM_LEGS];     ///< came off; cannot stick again before it has moved away
+    int8_t                 stuck_order[IVL_SIM_LEGS];  ///< leg numbers 1..4 in the order of first sticking, 0 none
+    int                    n_order;
+    bool                   plate_touched[IVL_SIM_PLATES];
+    double                 d_min_m;  ///< smallest distance of the body origin from the ceiling's surface
 } ivl_sim_world_t;
 
 typedef struct
 {
     const ivl_sim_model_t *model;
-    void *port; ///< of the flight cores
-    ivl_sim_state_t state, next;
-    ivl_sim_rate_t last, rate;
-    ivl_sim_contact_t contact;
-    ivl_sim_load_t load;
-    ivl_wide_t dt_s;
-    bool active[IVL_SIM_LANES];
-    ivl_sim_world_t world[IVL_SIM_LANES];
+    void                  *port;  ///< of the flight cores
+    ivl_sim_state_t        state, next;
+    ivl_sim_rate_t         last, rate;
+    ivl_sim_contact_t      contact;
+    ivl_sim_load_t         load;
+    ivl_wide_t             dt_s;
+    bool                   active[IVL_SIM_LANES];
+    ivl_sim_world_t        world[IVL_SIM_LANES];
 } ivl_sim_group_t;
 
 /// All lanes empty.
 void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group);
 
 /// Puts a vehicle into a lane: in free flight, level, rotors at hover, legs at rest; the core in IDLE.
-void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3],
-                         const double v_W_mps[3]);
+void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3], const double v_W_mps[3]);
 
 /// Replaces the state of motion, for tests; the feet hold on as before.
 void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *kin);
@@ -103,4 +102,4 @@ bool ivl_sim_world_diverged(const ivl_sim_state_t *state, int lane);
 
 int ivl_sim_world_count_stuck(const ivl_sim_world_t *world);
 
-#endif // IVL_SIM_WORLD_H
+#endif  // IVL_SIM_WORLD_H
