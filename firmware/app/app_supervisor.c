@@ -9,5 +9,5 @@ extern uint8_t tumbleCheckEnabled;
 void app_tumble_check_set(ivl_phase_t phase)
 {
     const bool is_off = (phase == IVL_PHASE_FLIP) || (phase == IVL_PHASE_COAST);
-    tumbleCheckEnabled = is_off ? 0u : 1u;
+    tumbleCheckEnabled = (uint8_t)(is_off ? 0u : 1u);
 }

@@ -1,0 +1,55 @@
+# The Crazyflie app without its SDK.  Called by the Makefile as
+#     make -f tools/app.mk <target>
+# Targets: check (host: unit tests on a stand-in for the SDK), objects (Cortex-M4F: core and app with the SDK's own flags, and their sizes).
+# tests/app/sdk declares what the app uses of the SDK; docs/FIRMWARE.md says when it was last linked against the real one.
+
+CROSS ?= arm-none-eabi-
+UNITY := build/unity
+
+SOURCES := $(wildcard firmware/core/*.c firmware/app/*.c)
+HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h tests/app/sdk/*.h)
+
+# ---- host: sanitizers on, strict warnings on our own files
+
+HOST       := build/app
+HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=all \
+              -Wall -Wextra -Wdouble-promotion -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes -Werror \
+              -DSDK_DOUBLE -Ifirmware/core -Ifirmware/app -Itests/app -isystem tests/app/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
+HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) tests/app/sdk_double.c tests/app/test_app.c tests/c/default_fixture.c)
+
+# ---- Cortex-M4F: the SDK's flags, and the one of our Kbuild files
+
+ARM       := build/firmware
+ARM_FLAGS := -Os -Werror -Wall -Wmissing-braces -fno-strict-aliasing -std=gnu11 -fno-math-errno -Wdouble-promotion -ffunction-sections \
+             -fdata-sections -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -g3 -ffp-contract=off -fstack-usage \
+             -Ifirmware/core -Ifirmware/app -isystem tests/app/sdk
+ARM_OBJ   := $(patsubst firmware/%.c,$(ARM)/%.o,$(SOURCES))
+# what the objects may ask of the world: the SDK's functions that tests/app/sdk declares, and these of the C library
+LIBRARY   := memcpy|memset|memcmp|memmove|strlen
+
+.DELETE_ON_ERROR:
+.PHONY: check objects
+
+check: $(HOST)/test_app
+	@tools/run_unity.sh $<
+
+$(HOST)/test_app: $(HOST_OBJ) $(HOST)/unity.o
+	@echo '  LINK  $@'
+	@$(CC) $(HOST_FLAGS) -o $@ $^ -lm
+
+$(HOST)/unity.o: $(UNITY)/unity.c
+	@mkdir -p $(@D)
+	@$(CC) -DUNITY_INCLUDE_DOUBLE -I$(UNITY) -fsanitize=address,undefined -c -o $@ $<
+
+$(HOST)/%.o: %.c $(HEADERS) tools/app.mk
+	@echo '  CC    $@'
+	@mkdir -p $(@D)
+	@$(CC) $(HOST_FLAGS) -c -o $@ $<
+
+objects: $(ARM_OBJ)
+	@tools/check_app.sh $(CROSS) '$(LIBRARY)' $(ARM)
+
+$(ARM)/%.o: firmware/%.c $(HEADERS) tools/app.mk
+	@echo '  CC    $@'
+	@mkdir -p $(@D)
+	@$(CROSS)gcc $(ARM_FLAGS) -c -o $@ $<
