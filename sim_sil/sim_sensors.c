@@ -3,6 +3,9 @@
 // Microseconds that the core's clock shows at the start of a rollout: samples older than the start stay positive.
 static const double CLOCK_OFFSET_S = 1.0;
 
+// A sample that is due at a tick is taken, or delivered, at that tick and not at the next one because of rounding.
+static const double TIME_SLACK_S = 1.0e-9;
+
 static uint64_t clock_us(double t_s)
 {
     return (uint64_t)((t_s + CLOCK_OFFSET_S) * 1.0e6 + 0.5);
@@ -65,7 +68,7 @@ static void deliver(const ivl_sim_model_t *model, double t_s, ivl_sim_sensors_t 
     while (sensors->n_delivered != sensors->n_taken)
     {
         const ivl_sim_pose_t *pose = &sensors->queue[sensors->n_delivered % IVL_SIM_POSE_QUEUE];
-        if (pose->t_s + model->raw.sense_latency_s > t_s)
+        if (pose->t_s + model->raw.sense_latency_s > t_s + TIME_SLACK_S)
         {
             return;
         }
@@ -138,7 +141,7 @@ static void read_imu(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, con
 void ivl_sim_sensors_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, const double a_W_mps2[3],
                           double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in)
 {
-    while (sensors->next_s <= t_s)
+    while (sensors->next_s <= t_s + TIME_SLACK_S)
     {
         take_pose(model, rng, state, a_W_mps2, t_s - sensors->next_s, sensors);
     }
