@@ -36,6 +36,7 @@ typedef struct
     bool      open, bad;
     ivl_cfg_t cfg[LANES];  ///< as spoiled
     fault_t   fault[LANES];
+    bool      has_vitals[LANES];  ///< this vehicle tells of battery, radio and autopilot
     uint32_t  n_request[LANES];
 } recorder_t;
 
@@ -85,6 +86,7 @@ enum
     FAULT_UPSIDE_DOWN,
     FAULT_IMPACT,
     FAULT_HANGING,
+    FAULT_VITALS,  ///< battery, radio or autopilot
     FAULT_COUNT
 };
 
@@ -105,7 +107,7 @@ static float *number_of(ivl_in_t *in, uint32_t i)
 static void begin_fault(recorder_t *r, fault_t *fault, const ivl_in_t *in)
 {
     *fault = (fault_t){.n_left = 1u + below(r, 1u << below(r, 8)),
-                       .kind = below(r, FAULT_COUNT),
+                       .kind = (below(r, 3) == 0u) ? (uint32_t)FAULT_NUMBER : below(r, FAULT_COUNT),
                        .field = below(r, N_FLOATS),
                        .value = NUMBERS[below(r, sizeof NUMBERS / sizeof NUMBERS[0])],
                        .t_us = in->t_us,
@@ -144,6 +146,30 @@ static void spoil_motion(recorder_t *r, const fault_t *fault, ivl_in_t *in)
     in->w_B_radps = (ivl_vec3_t){between(r, -w, w), between(r, -w, w), between(r, -w, w)};
 }
 
+static const ivl_vitals_t GOOD_VITALS = {.given = true,
+                                         .configured = true,
+                                         .can_fly = true,
+                                         .stock_idle = true,
+                                         .vbat_V = 4.0f,
+                                         .link_age_s = 0.01f,
+                                         .setpoint_age_s = 0.01f,
+                                         .host_age_s = 0.02f,
+                                         .p_sigma_m = 0.005f};
+
+static void spoil_vitals(const fault_t *fault, ivl_vitals_t *vitals)
+{
+    bool *const  flags[] = {&vitals->configured, &vitals->can_fly, &vitals->bypassed, &vitals->stock_idle};
+    float *const values[] = {&vitals->vbat_V, &vitals->link_age_s, &vitals->setpoint_age_s, &vitals->host_age_s, &vitals->p_sigma_m};
+    if (fault->field < 4u)
+    {
+        *flags[fault->field] = !*flags[fault->field];
+    }
+    else
+    {
+        *values[fault->field % 5u] = fault->value;
+    }
+}
+
 static void spoil(recorder_t *r, const fault_t *fault, ivl_in_t *in)
 {
     switch (fault->kind)
@@ -178,6 +204,9 @@ static void spoil(recorder_t *r, const fault_t *fault, ivl_in_t *in)
         break;
     case FAULT_HANGING:
         in->f_B_mps2 = (ivl_vec3_t){0.0f, 0.0f, -9.81f};
+        break;
+    case FAULT_VITALS:
+        spoil_vitals(fault, &in->vitals);
         break;
     default:
         spoil_request(fault, &in->cmd);
@@ -239,6 +268,7 @@ static void init(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state)
         request.with.cfg.mass_kg = NUMBERS[below(r, sizeof NUMBERS / sizeof NUMBERS[0])];
     }
     memset(&r->fault[lane], 0, sizeof r->fault[lane]);
+    r->has_vitals[lane] = chance(r, 0.5);
     r->n_request[lane] = 0;
     r->cfg[lane] = request.with.cfg;
     ivl_init(&r->cfg[lane], state);
@@ -274,6 +304,10 @@ static void step(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state,
     fault_t           *fault = &r->fault[lane];
     ivl_port_request_t request = new_request(IVL_PORT_STEP, lane);
     request.with.in = *in;
+    if (r->has_vitals[lane])
+    {
+        request.with.in.vitals = GOOD_VITALS;
+    }
     if (fault->n_left == 0u && chance(r, r->fault_norm))
     {
         begin_fault(r, fault, in);

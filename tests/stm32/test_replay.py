@@ -13,12 +13,13 @@ from ivl import native
 
 N_TICKS = 40_000
 AT_LEAST = {
-    "phase idle": 100, "phase ready": 1000, "phase approach": 5000, "phase flip": 1000, "phase coast": 500,
-    "phase attached": 100, "phase done": 500, "phase aborted": 1000, "inputs not finite": 100,
-    "inputs denormal": 100, "inputs beyond 1e8": 10, "poses older than 40 ms": 50, "poses from the future": 50,
-    "poses refused": 500, "commands refused": 100, "policies refused": 3, "a motor at its limit": 500,
-    "a motor at rest while others run": 1000, "motors run": 5000,
+    "phase idle": 50, "phase ready": 500, "phase approach": 2000, "phase flip": 300, "phase coast": 100,
+    "phase attached": 30, "phase done": 100, "phase aborted": 500, "inputs not finite": 50, "inputs denormal": 50,
+    "inputs beyond 1e8": 30, "poses older than 40 ms": 5, "poses from the future": 30, "poses refused": 200,
+    "commands refused": 50, "policies refused": 1, "a motor at its limit": 500,
+    "a motor at rest while others run": 500, "motors run": 5000,
 }  # fmt: skip
+"""A tenth of what eight seeds show: a recording that no longer visits something is noticed."""
 MOTORS_OFF = (0, 4, 5, 6)  # idle, coast, attached, done
 
 

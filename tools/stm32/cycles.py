@@ -57,6 +57,11 @@ class Tally:
     worst: list[int] = field(default_factory=list)
     bound: list[int] = field(default_factory=list)
 
+    def add(self, other: "Tally") -> None:
+        """Append the ticks of another recording."""
+        for mine, more in zip(vars(self).values(), vars(other).values(), strict=True):
+            mine.extend(more)
+
 
 class Chip:
     """The flight core of a linked program, called function by function."""

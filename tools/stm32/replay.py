@@ -126,7 +126,8 @@ def _count(asked: npt.NDArray[np.void], answered: npt.NDArray[np.void]) -> dict[
     step = asked["operation"] == _STEP
     steps, replies = asked[step], answered[step]
     counts = {f"phase {name}": int((replies["out.phase"] == i).sum()) for i, name in enumerate(PHASES)}
-    numbers = [n for n in asked.dtype.names or () if n.startswith("with.in.") and asked.dtype[n].kind == "f"]
+    names = asked.dtype.names or ()
+    numbers = [n for n in names if n.startswith("with.in.") and asked.dtype[n].kind == "f" and ".vitals." not in n]
     values = np.stack([steps[n] for n in numbers], axis=1)
     size = np.abs(values)
     counts["inputs not finite"] = int((~np.isfinite(values)).any(axis=1).sum())
@@ -137,6 +138,7 @@ def _count(asked: npt.NDArray[np.void], answered: npt.NDArray[np.void]) -> dict[
     counts["poses from the future"] = int((age_us < 0).sum())
     counts["poses refused"] = int((replies["state.sense.pose_fresh"] == 0).sum())
     counts["commands refused"] = int((replies["state.sense.cmd_fresh"] == 0).sum())
+    counts["battery, radio and autopilot known"] = int((steps["with.in.vitals.given"] != 0).sum())
     counts["policies refused"] = int(((asked["operation"] == _COMMIT) & (answered["status"] != 0)).sum())
     thrusts = np.stack([replies[f"out.thrust_N[{i}]"] for i in range(4)], axis=1)
     motors_on = replies["out.motors_on"] != 0
