@@ -57,6 +57,14 @@ def test_fit_finds_hyper_parameters_better_than_where_it_began() -> None:
     assert gain > 10
 
 
+def test_fit_keeps_the_noise_ratio_above_its_floor() -> None:
+    x, _ = data(40)
+    y = np.sin(5 * x[:, 0]) + x[:, 1]
+    free, floored = (fit(x, y, HYPER, HYPER, noise_min) for noise_min in (0.0, 0.008))
+    assert free.noise < 0.008
+    assert floored.noise == pytest.approx(0.008, rel=1e-12)
+
+
 def test_fit_is_deterministic() -> None:
     x, y = data(40)
     first, second = (fit(x, y, HYPER, HYPER) for _ in range(2))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from ivl.errors import LearnerError
 from ivl.learners.bo import BOLearner
 from ivl.learners.gp import GaussianProcess, Hyper
 
@@ -69,6 +70,20 @@ def test_the_recommendation_may_lie_on_a_bound() -> None:
         theta = learner.ask()
         learner.tell(theta, theta[:, 1])
     assert learner.result.recommended[1] == pytest.approx(10.65, abs=0.2)
+
+
+def test_repeated_success_beside_a_failure_does_not_shorten_the_kernel_without_end() -> None:
+    rng = np.random.default_rng(5)
+    learner = BOLearner([4.0, 5.0], [1.5, 1.5], bounds=BOUNDS)
+    for _ in range(6):
+        theta = [4.8, 8.0] + [0.2, 1.0] * rng.standard_normal((16, 2))
+        learner.tell(theta, np.where(theta[:, 0] > 4.8, 170.0, 60.0))
+    assert learner.state_dict()["search"]["noise"] >= 0.05
+
+
+def test_a_noise_floor_above_the_prior_is_refused() -> None:
+    with pytest.raises(LearnerError, match=r"noise_min 0\.5 must not be above noise 0\.2"):
+        BOLearner([4.0, 5.0], [1.5, 1.5], bounds=BOUNDS, noise_min=0.5)
 
 
 def test_one_observation_gives_the_posterior_worked_out_by_hand() -> None:

@@ -11,14 +11,15 @@ the start's spread, z = (theta - mu0) / sigma0, with y the returns shifted and s
 Candidates are uniform in the box and normal about the best remembered policies and the recommended one, spread by a
 share of the kernel's lengths. Draws differ where the returns are uncertain and agree where they are known, so that the
 search turns from exploring to repeating by itself: no spread shrinks by rule, so none collapses on a shelf beside the
-target.
+target. The noise ratio has a floor: at the edge of a landing region equal policies end differently, and a model without
+noise explains that by ever shorter lengths, until it takes every lone landing for a peak.
 """
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ivl.learners.base import FloatArray, Learner, Meta, Options, draw_truncated
 from ivl.learners.gp import GaussianProcess, Hyper, fit
@@ -31,12 +32,19 @@ class BOOptions(Options):
 
     length: float = Field(default=0.5, gt=0, le=100, description="prior kernel length in each dimension")
     noise: float = Field(default=0.2, gt=0, le=10, description="prior ratio of noise variance to signal variance")
+    noise_min: float = Field(default=0.05, gt=0, le=10, description="least such ratio, not above `noise`")
     caution: float = Field(default=0.5, ge=0, le=10, description="recommended = argmax(mean - caution sd)")
     n_uniform: int = Field(default=400, ge=10, le=5000, description="candidates over the whole box")
     n_near: int = Field(default=300, ge=10, le=5000, description="candidates near what was best")
     n_elite: int = Field(default=20, ge=1, le=1000, description="policies that count as best")
     jitter: float = Field(default=0.25, gt=0, le=10, description="spread of the near candidates, in kernel lengths")
     memory: int = Field(default=400, ge=8, le=4000, description="latest rollouts that the model is made from")
+
+    @model_validator(mode="after")
+    def _floor_below_prior(self) -> Self:
+        if self.noise_min > self.noise:
+            raise ValueError(f"noise_min {self.noise_min} must not be above noise {self.noise}")
+        return self
 
 
 class BOLearner(Learner):
@@ -67,7 +75,7 @@ class BOLearner(Learner):
     def _update(self, theta: FloatArray, rewards: FloatArray, _meta: Meta, /) -> None:
         self._x = np.vstack([self._x, self._scale(theta)])[-self.options.memory :]
         self._rewards = np.append(self._rewards, rewards)[-self.options.memory :]
-        self._hyper = fit(self._x, self._values(), self._prior, self._hyper)
+        self._hyper = fit(self._x, self._values(), self._prior, self._hyper, self.options.noise_min)
         self._refresh()
 
     def _refresh(self) -> None:

@@ -82,9 +82,19 @@ def log_likelihood(x: FloatArray, y: FloatArray, hyper: Hyper) -> float:
     return float(-0.5 * len(x) * np.log(variance) - np.log(np.diag(factor)).sum())
 
 
-def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, n_rounds: int = 3) -> Hyper:
-    """Hyper-parameters of the largest posterior density, by a deterministic pattern search from `prior` and `start`."""
+def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, noise_min: float = 0.0, n_rounds: int = 3) -> Hyper:
+    """Hyper-parameters of the largest posterior density, by a deterministic pattern search from `prior` and `start`.
+
+    Args:
+        x: Points, shape (n, dim).
+        y: Values, shape (n,), standardised.
+        prior: Medians of the log-normal priors; its noise must not be below `noise_min`, nor that of `start`.
+        start: Where the search begins, if that is better than `prior`.
+        noise_min: Smallest noise ratio.
+        n_rounds: Passes over all parameters, each with half the step of the one before.
+    """
     center = prior.log()
+    floor = np.append(np.full(x.shape[1], -np.inf), np.log(noise_min) if noise_min > 0 else -np.inf)
 
     def score(vector: FloatArray) -> float:
         penalty = 0.5 * float(((vector - center) ** 2).sum()) / _PRIOR_LOG_SD**2
@@ -96,7 +106,7 @@ def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, n_rounds: int 
         for axis in range(len(best)):
             for sign in (-1.0, 1.0):
                 trial = best.copy()
-                trial[axis] += sign * step
+                trial[axis] = max(trial[axis] + sign * step, floor[axis])
                 trial_score = score(trial)
                 if trial_score > best_score:
                     best, best_score = trial, trial_score
