@@ -216,6 +216,15 @@ static void tick(ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
     }
 }
 
+/// Positive form: what is no number is refused too.
+static bool in_range(const ivl_sim_spec_t *spec)
+{
+#define WITHIN(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                                           \
+    &&(double)spec->name[0] >= (double)(lo) && (double)spec->name[0] <= (double)(hi)
+    return true IVL_SIM_SPEC_FIELDS(WITHIN);
+#undef WITHIN
+}
+
 /// Puts the next landing of the source into a lane; the lane stays empty if there is none.
 static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
 {
@@ -223,7 +232,12 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
     while (!group->active[lane] && source(context, job))
     {
         clear(job->outcome);
-        if (start(group, lane, job->spec))
+        if (!in_range(job->spec))
+        {
+            job->outcome->end_reason[0] = IVL_SIM_END_REFUSED;
+            job->outcome->t_end_s[0] = 0.0;
+        }
+        else if (start(group, lane, job->spec))
         {
             trace(job->tracer, group, lane);
             tick(group, lane, job->outcome);
