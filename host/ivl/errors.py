@@ -31,3 +31,7 @@ class LearnerError(IvlError, ValueError):
 
 class StoreError(IvlError):
     """A run folder cannot be created, read, or continued."""
+
+
+class LinkError(IvlError):
+    """The link to a vehicle is missing, was lost, or did not do what was asked."""

@@ -1,4 +1,4 @@
-"""The command line: `ivl learn`, `ivl rollout`, `ivl list`, `ivl bench`.
+"""The command line: `ivl learn`, `ivl rollout`, `ivl list`, `ivl bench`, `ivl flash`.
 
 Exit codes: 0 success, 1 the work failed, 2 wrong usage or configuration, 130 interrupted.
 """
@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from ivl.cli import bench, console, learn, listing, rollout
+from ivl.cli import bench, console, flash, learn, listing, rollout
 from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
 
 app = typer.Typer(
@@ -21,6 +21,7 @@ app.command("learn", help=learn.HELP)(learn.learn)
 app.command("rollout", help=rollout.HELP)(rollout.rollout)
 app.command("list", help=listing.HELP)(listing.list_)
 app.command("bench", help=bench.HELP)(bench.bench)
+app.command("flash", help=flash.HELP)(flash.flash)
 
 
 def run(arguments: list[str] | None = None) -> int:
