@@ -22,6 +22,7 @@ STM32  := stm32-Os stm32-O2 stm32-clang
 SUBMAKE = $(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS)) -Otarget
 NATIVE  = $(SUBMAKE) -f tools/native.mk
 CROSS   = $(SUBMAKE) -f tools/stm32.mk
+APP     = $(SUBMAKE) -f tools/app.mk
 say     = @printf '==> %s\n'
 pip     = $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint tools/constraints.txt
 
@@ -51,11 +52,13 @@ learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for ano
 ##@ The vehicle's processor
 
 .PHONY: firmware
-firmware: $(STM32:%=firmware-%) ## compile the flight core for the STM32F405 and print its size
+firmware: $(STM32:%=firmware-%) ## compile flight core and Crazyflie app for the STM32F405 and print their sizes
 	@+$(CROSS) FLAVOUR=stm32-Os install
 	$(say) 'firmware: flight core, bytes of flash'
 	@for flavour in $(STM32); do \
 	    printf '  %-12s ' $$flavour; arm-none-eabi-size --totals build/$$flavour/firmware/core/*.o | awk 'END {print $$1}'; done
+	$(say) 'firmware: Crazyflie app, compiled with the flags of its SDK'
+	@+$(APP) objects
 
 .PHONY: $(STM32:%=firmware-%)
 $(STM32:%=firmware-%): firmware-%: cross-toolchain
@@ -105,6 +108,8 @@ test: lint test-c san golden test-py test-mujoco pil sizes-diff ## everything be
 test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator (Unity)
 	$(say) 'test-c: C tests, strict warnings as errors'
 	@+$(NATIVE) FLAVOUR=release check
+	$(say) 'test-c: Crazyflie app on a stand-in for its SDK, ASan and UBSan'
+	@+$(APP) check
 
 .PHONY: san
 san: toolchain $(UNITY)/unity.c ## the same C tests under AddressSanitizer and UndefinedBehaviorSanitizer
@@ -189,7 +194,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_pil/*.[ch] tests/c/*.[ch] tests/stm32/*.c)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_pil/*.[ch] tests/c/*.[ch] tests/stm32/*.c tests/app/*.[ch] tests/app/sdk/*.h)
 
 # set-up, each step once
 
