@@ -16,7 +16,7 @@ export CC CLANG
 VENV   := .venv
 BIN    := $(VENV)/bin
 UNITY  := build/unity
-GOLDEN := O0 release clang-O0 clang
+GOLDEN := release O0 sse2 avx2 clang clang-O0
 STM32  := stm32-Os stm32-O2 stm32-clang
 # a -j given by the user is passed on; without one the C code is compiled on all cores
 SUBMAKE = $(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS)) -Otarget
@@ -101,7 +101,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 .PHONY: test
-test: lint test-c san golden test-py test-mujoco pil sizes-diff ## everything below, set-up and compilers included
+test: lint test-c san golden test-py test-physics test-mujoco pil sizes-diff ## everything below, set-up and compilers included
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
@@ -112,29 +112,41 @@ test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator 
 	@+$(APP) check
 
 .PHONY: san
-san: toolchain $(UNITY)/unity.c ## the same C tests under AddressSanitizer and UndefinedBehaviorSanitizer
+san: toolchain setup-dev $(UNITY)/unity.c ## the same C tests, and landings, under AddressSanitizer and UndefinedBehaviorSanitizer
 	$(say) 'san: C tests under ASan and UBSan'
-	@+$(NATIVE) FLAVOUR=san check
+	@+$(NATIVE) FLAVOUR=san check lib
+	$(say) 'san: landings under ASan and UBSan'
+	@LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 IVL_NATIVE_LIBRARY=build/san/libivl_sil.so \
+	    $(BIN)/python -m pytest -p no:cacheprovider -m 'not slow' tests/physics $(PYTEST_ARGS)
 
 .PHONY: golden
-golden: $(GOLDEN:%=golden-build-%) ## same bits from gcc and clang, -O0 and -O3, one thread or many
+golden: setup $(GOLDEN:%=golden-build-%) ## same bits from gcc and clang, -O0 and -O3, any registers, one thread or many
 	$(say) 'golden: hashes of reference landings'
-	@$(PYTHON) tools/golden.py $(GOLDEN:%=build/%/sim_golden)
+	@$(BIN)/python tools/golden.py $(GOLDEN:%=build/%/libivl_sil.so)
 
 .PHONY: golden-update
-golden-update: $(GOLDEN:%=golden-build-%) ## accept the present hash as the reference (in its own commit, with the reason)
-	$(say) 'golden-update: tests/c/golden.txt'
-	@$(PYTHON) tools/golden.py --update $(GOLDEN:%=build/%/sim_golden)
+golden-update: setup $(GOLDEN:%=golden-build-%) ## accept the present hashes as the reference (in its own commit, with the reason)
+	$(say) 'golden-update: tests/golden/landings.txt'
+	@$(BIN)/python tools/golden.py --update $(GOLDEN:%=build/%/libivl_sil.so)
 
 .PHONY: $(GOLDEN:%=golden-build-%)
 $(GOLDEN:%=golden-build-%): golden-build-%: toolchain
 	$(say) 'golden: compiling $*'
-	@+$(NATIVE) FLAVOUR=$* golden
+	@+$(NATIVE) FLAVOUR=$* lib
 
 .PHONY: test-py
 test-py: setup-dev build ## tests of the Python package
 	$(say) 'test-py: pytest tests/py'
 	@$(BIN)/python -m pytest tests/py $(PYTEST_ARGS)
+
+.PHONY: test-physics
+test-physics: setup-dev build ## landings with known properties, and a sample of the step-size study
+	$(say) 'test-physics: pytest tests/physics'
+	@$(BIN)/python -m pytest tests/physics $(PYTEST_ARGS)
+
+.PHONY: step-study
+step-study: setup-dev build ## ten thousand landings with shorter and shorter steps (2 min)
+	@$(BIN)/python tests/physics/step_study.py
 
 .PHONY: test-mujoco
 test-mujoco: setup-dev build ## landings compared with an independent engine
