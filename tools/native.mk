@@ -39,7 +39,7 @@ VARIANTS :=
 
 # the simulator passes vectors by value, within one compilation only: the note that their ABI once changed is idle
 FLAGS_sim_sil := -Wno-psabi
-FLAGS_sim_pil := $(FLAGS_sim_sil) -Ifirmware/stm32f405
+FLAGS_sim_sil/pil := $(FLAGS_sim_sil) -Ifirmware/stm32f405
 
 # Unity is a foreign source: a system header to the tests, compiled without our warnings
 UNITY         := build/unity
@@ -48,7 +48,7 @@ FLAGS_tests/c := $(FLAGS_unity) $(FLAGS_sim_sil) -Itests/c
 
 BUILD   := build/$(FLAVOUR)
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
-SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_pil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
+SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/pil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
 LIBRARY := host/ivl/_native/libivl_sil.so

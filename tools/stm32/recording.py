@@ -1,4 +1,4 @@
-"""Landings of the simulator, recorded as requests to the flight core and its replies here (sim_pil/record.h)."""
+"""Landings of the simulator, recorded as requests to the flight core and its replies here (sim_sil/pil/record.h)."""
 
 import ctypes
 from collections.abc import Iterator
