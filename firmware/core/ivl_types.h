@@ -105,16 +105,16 @@ typedef enum
 /// then every rule about it is satisfied.
 typedef struct
 {
-    bool  given;           ///< false: the members below mean nothing
-    bool  configured;      ///< the operator has put a configuration in force since the start
-    bool  can_fly;         ///< the autopilot around the core lets the motors run
-    bool  bypassed;        ///< somebody drives the motors past the core
-    bool  stock_idle;      ///< the autopilot's own set-point asks for no thrust
-    float vbat_V;          ///< battery
-    float link_age_s;      ///< since the link was last up
-    float setpoint_age_s;  ///< of the autopilot's own set-point
-    float host_age_s;      ///< since the last command of the host
-    float p_sigma_m;       ///< standard deviation of the position estimate, largest axis
+    uint8_t given;           ///< flags are 0 or not; given 0: the members below mean nothing
+    uint8_t configured;      ///< the operator has put a configuration in force since the start
+    uint8_t can_fly;         ///< the autopilot around the core lets the motors run
+    uint8_t bypassed;        ///< somebody drives the motors past the core
+    uint8_t stock_idle;      ///< the autopilot's own set-point asks for no thrust
+    float   vbat_V;          ///< battery
+    float   link_age_s;      ///< since the link was last up
+    float   setpoint_age_s;  ///< of the autopilot's own set-point
+    float   host_age_s;      ///< since the last command of the host
+    float   p_sigma_m;       ///< standard deviation of the position estimate, largest axis
 } ivl_vitals_t;
 
 /// One sensed state of the vehicle.

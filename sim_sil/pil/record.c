@@ -158,8 +158,8 @@ static const ivl_vitals_t GOOD_VITALS = {.given = true,
 
 static void spoil_vitals(const fault_t *fault, ivl_vitals_t *vitals)
 {
-    bool *const  flags[] = {&vitals->configured, &vitals->can_fly, &vitals->bypassed, &vitals->stock_idle};
-    float *const values[] = {&vitals->vbat_V, &vitals->link_age_s, &vitals->setpoint_age_s, &vitals->host_age_s, &vitals->p_sigma_m};
+    uint8_t *const flags[] = {&vitals->configured, &vitals->can_fly, &vitals->bypassed, &vitals->stock_idle};
+    float *const   values[] = {&vitals->vbat_V, &vitals->link_age_s, &vitals->setpoint_age_s, &vitals->host_age_s, &vitals->p_sigma_m};
     if (fault->field < 4u)
     {
         *flags[fault->field] = !*flags[fault->field];
