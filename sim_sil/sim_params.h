@@ -77,7 +77,7 @@
     X(step, touch, s, "s", 1.0e-6, 0.002, 0.0005, "integration step right after a contact event") \
     X(step, plate, s, "s", 1.0e-6, 0.0005, 0.0001, "largest integration step while a plate presses on the ceiling") \
     X(step, swing, s, "s", 1.0e-6, 0.004, 0.002, "largest integration step after the first contact") \
-    X(step, turn, rad, "rad", 1.0e-4, 1.0, 0.01, "largest turn of the body in one step while four feet are stuck") \
+    X(step, turn, rad, "rad", 1.0e-4, 1.0, 0.02, "largest turn of the body in one step while four feet are stuck") \
     X(step, growth, norm, "1", 1.0, 2.0, 1.2, "factor by which the step grows from one to the next") \
     X(step, scale, norm, "1", 0.001, 1.0, 1.0, "multiplies all steps; for convergence studies")
 // clang-format on

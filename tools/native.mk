@@ -30,6 +30,12 @@ CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPI
           -Ifirmware/core -Isim_sil
 LDLIBS := -lm -pthread
 
+# objects of the release flavour also carry what GCC needs to optimise the library as a whole; the tests link them as they are
+ifneq ($(findstring Free Software Foundation,$(shell $(CC) --version)),)
+LTO_release := -flto -ffat-lto-objects
+LTO_LINK_release := -flto=auto
+endif
+
 # Further flags of a folder and of a single object, the latter by its name without folder and suffix:
 #     FLAGS_sim_dynamics := -mavx2 -mno-fma
 # A source that is compiled again under other flags is listed as <stem>@<variant>:
@@ -73,7 +79,7 @@ $(LIBRARY): $(BUILD)/libivl_sil.so
 
 $(BUILD)/libivl_sil.so: $(CORE) $(SIM) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -shared -Wl,-Bsymbolic -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -shared -Wl,-Bsymbolic -o $@ $(filter %.o,$^) $(LDLIBS)
 
 $(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
@@ -85,7 +91,7 @@ run-test_%: $(BUILD)/test_% FORCE
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(WARNINGS) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
 endef
 
 $(BUILD)/%.o: %.c $(BUILD)/flags.txt
@@ -98,7 +104,7 @@ $(BUILD)/unity.o: $(UNITY)/unity.c tools/native.mk
 $(foreach v,$(VARIANTS),$(eval $(BUILD)/sim_sil/$v.o: sim_sil/$(firstword $(subst @, ,$v)).c $(BUILD)/flags.txt ; $$(compile)))
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
-ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
+ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(LTO_LINK_$(FLAVOUR)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
 ALL_OBJECTS := $(CORE) $(SIM) $(SUPPORT)
 
 define remember
