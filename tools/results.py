@@ -133,7 +133,7 @@ def wilson(k: int, n: int) -> tuple[float, float]:
     z, share = 1.96, k / n
     center = (share + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
-    return center - half, center + half
+    return max(0.0, center - half), min(1.0, center + half)
 
 
 def find_best(condition: Condition, threads: int) -> assess.Best:
