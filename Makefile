@@ -168,6 +168,8 @@ lint: setup-dev toolchain ## formatting, types, rules of the firmware core, equa
 	@tools/check_core.sh build/O0/firmware/core build/release/firmware/core
 	$(say) 'lint: equation references'
 	@$(BIN)/python tools/check_refs.py
+	$(say) 'lint: docs/PARAMS.md is what the table of parameters gives'
+	@$(BIN)/python tools/params.py --check
 
 ##@ Work
 
