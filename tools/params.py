@@ -1,4 +1,4 @@
-"""Write docs/PARAMS.md from the tables of firmware/core/ivl_vars.h; with --check say whether the page is what they give.
+"""Write docs/PARAMS.md from the tables of firmware/core/ivl_vars.h; with --check say whether the page is up to date.
 
 The C compiler expands the tables (tools/vars.c), so that the page cannot read them differently from the firmware.
 """
@@ -14,10 +14,12 @@ PAGE = ROOT / "docs" / "PARAMS.md"
 HEAD = """\
 # Parameters and logs of the flight core
 
-Printed by `python tools/params.py` from [firmware/core/ivl_vars.h](../firmware/core/ivl_vars.h), the one table that the drone's
-parameters and logs, the software vehicle and the host share. A parameter outside its range, or no number, is refused, and with it the
+Printed by `python tools/params.py` from [firmware/core/ivl_vars.h](../firmware/core/ivl_vars.h), the one table that the
+drone, the software vehicle and the host share. A parameter outside its range, or no number, is refused, and with it the
 whole commit ([FIRMWARE](FIRMWARE.md)). Unit 1: dimensionless.
 """
+PARAM_HEAD = "## Parameters\n\n| parameter | type | unit | from | to | default | |\n|---|---|---|---|---|---|---|"
+LOG_HEAD = "## Logs\n\n| log | type | unit | |\n|---|---|---|---|"
 TYPES = {"float": "float", "uint8_t": "u8", "uint16_t": "u16", "uint32_t": "u32", "int8_t": "i8"}
 
 
@@ -33,8 +35,8 @@ def rows() -> list[list[str]]:
 
 def page() -> str:
     """The whole text."""
-    params = ["## Parameters", "", "| parameter | type | unit | from | to | default | |", "|---|---|---|---|---|---|---|"]
-    logs = ["## Logs", "", "| log | type | unit | |", "|---|---|---|---|"]
+    params = [PARAM_HEAD]
+    logs = [LOG_HEAD]
     for kind, ctype, name, unit, low, high, default, text in rows():
         if kind == "param":
             params.append(f"| `{name}` | {TYPES[ctype]} | {unit} | {low} | {high} | {default} | {text} |")
