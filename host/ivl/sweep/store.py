@@ -1,0 +1,153 @@
+"""The run folder of a sweep: open columnar files that are there whole or not at all.
+
+A finished task leaves one Parquet part of each kind of table, named after the task; that of `tasks` is written last and
+means that the others are there. So a run that was cut off at any moment loses the running tasks and nothing else, and
+what is done can be read while the rest is still flown.
+"""
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd  # type: ignore[import-untyped]
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
+import xarray as xr
+
+from ivl.errors import StoreError
+from ivl.sweep import schema
+from ivl.sweep.schema import CELL, KINDS, SCHEMA_VERSION, TASKS, TRIAL_KEY, VERSION_KEY
+
+_SORT = {
+    schema.TRIALS: TRIAL_KEY,
+    schema.EPISODES: (*TRIAL_KEY, "episode"),
+    schema.ROLLOUTS: (*TRIAL_KEY, "episode", "idx"),
+    schema.MAP: ("vehicle", "gear_set", "gear", "speed_mps", "angle_deg", "d_ceil_m", "moment_y_Nmm"),
+    schema.FAILURES: TRIAL_KEY,
+    schema.TASKS: ("task",),
+}
+
+
+def read_manifest(run: Path | str) -> dict[str, Any]:
+    """The manifest of a sweep's run folder.
+
+    Raises:
+        StoreError: There is none, it cannot be read, or it is of another schema version.
+    """
+    path = Path(run) / "manifest.json"
+    if not path.is_file():
+        raise StoreError(f"{run}: holds no sweep (no manifest.json)")
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path}: cannot be read: {error}") from error
+    if not isinstance(manifest, dict) or "sweep" not in manifest:
+        raise StoreError(f"{path}: is not the manifest of a sweep")
+    if manifest.get("schema_version") != SCHEMA_VERSION:
+        version = manifest.get("schema_version")
+        raise StoreError(f"{path}: schema_version {version!r}, this program reads {SCHEMA_VERSION}")
+    return manifest
+
+
+def read_table(run: Path | str, kind: str) -> pa.Table:
+    """One kind of table of a run (see `schema.KINDS`), its key in ascending order; no rows if nothing was kept.
+
+    Raises:
+        StoreError: A file cannot be read or has other columns than this version writes.
+    """
+    if kind not in KINDS:
+        raise StoreError(f"{run}: no table {kind!r} (allowed {', '.join(KINDS)})")
+    wanted = schema.schema(kind)
+    parts = [_read_part(path, wanted) for path in sorted((Path(run) / kind).glob("*.parquet"))]
+    if not parts:
+        return wanted.empty_table()
+    table = pa.concat_tables(parts).unify_dictionaries()
+    return table.sort_by([(name, "ascending") for name in _SORT[kind]])
+
+
+def read_frame(run: Path | str, kind: str) -> pd.DataFrame:
+    """One kind of table as a pandas frame; names are categories, units are in `frame.attrs["units"]`."""
+    frame = read_table(run, kind).to_pandas()
+    frame.attrs["units"] = schema.units(kind)
+    return frame
+
+
+def read_trials(run: Path | str) -> pd.DataFrame:
+    """One row per trial; columns as `schema.schema("trials")`."""
+    return read_frame(run, schema.TRIALS)
+
+
+def read_episodes(run: Path | str) -> pd.DataFrame:
+    """One row per trial and episode."""
+    return read_frame(run, schema.EPISODES)
+
+
+def read_rollouts(run: Path | str) -> pd.DataFrame:
+    """One row per rollout; no rows if the sweep did not keep them."""
+    return read_frame(run, schema.ROLLOUTS)
+
+
+def read_map(run: Path | str) -> pd.DataFrame:
+    """One row per point of a policy map."""
+    return read_frame(run, schema.MAP)
+
+
+def to_xarray(run: Path | str, kind: str = schema.TRIALS) -> xr.Dataset:
+    """A run as a labelled array: dimensions are the key of the table, variables have `units` and `long_name`.
+
+    Vehicle, gear set and learner become dimensions only if the run has more than one of them, else attributes. Cells
+    that are missing are NaN.
+    """
+    frame, columns = read_frame(run, kind), schema.schema(kind)
+    key = [name for name in _SORT[kind] if name in frame]
+    single = [name for name in ("vehicle", "gear_set", "learner") if name in key and frame[name].nunique() <= 1]
+    attributes = {name: str(frame[name].iloc[0]) for name in single if len(frame)}
+    for name in CELL:
+        if name in frame and isinstance(frame[name].dtype, pd.CategoricalDtype):
+            frame[name] = frame[name].astype(object)
+    indexed = frame.drop(columns=single).set_index([name for name in key if name not in single])
+    data = xr.Dataset.from_dataframe(indexed)
+    for name in [*data.data_vars, *data.coords]:
+        field = columns.field(str(name))
+        data[name].attrs = {"units": field.metadata[b"unit"].decode(), "long_name": field.metadata[b"doc"].decode()}
+    data.attrs = {**attributes, "schema_version": SCHEMA_VERSION}
+    return data
+
+
+def _read_part(path: Path, wanted: pa.Schema) -> pa.Table:
+    try:
+        table = pq.read_table(path, partitioning=None)
+    except (OSError, pa.ArrowInvalid) as error:
+        raise StoreError(f"{path}: cannot be read: {error}") from error
+    version = (table.schema.metadata or {}).get(VERSION_KEY, b"?").decode()
+    if version != str(SCHEMA_VERSION):
+        raise StoreError(f"{path}: schema version {version}, this program reads {SCHEMA_VERSION}")
+    if table.schema.names != wanted.names:
+        odd = sorted(set(table.schema.names) ^ set(wanted.names))
+        raise StoreError(f"{path}: other columns than this version's: {', '.join(odd) or 'in another order'}")
+    return table
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file so that it is there whole or not at all, and on the disk when this returns."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    with temporary.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+
+
+def finished_tasks(run: Path) -> set[int]:
+    """Numbers of the tasks whose results are in the run folder."""
+    return {int(path.stem) for path in (run / TASKS).glob("*.parquet")}
+
+
+def write_part(run: Path, task: int, parts: Mapping[str, bytes]) -> None:
+    """Store what a task sent back; `parts` are Parquet files by kind, that of `tasks` is written last."""
+    for kind in (*(k for k in parts if k != TASKS), TASKS):
+        folder = run / kind
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(folder / f"{task:06d}.parquet", parts[kind])
