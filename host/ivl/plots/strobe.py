@@ -117,7 +117,7 @@ def _row_at(rows: Any, time_s: float) -> Any:
 
 def _draw_vehicle(axis: Axes, world: World, row: Any, color: Any, width: float) -> None:
     """Propeller plate thick, base plate thinner, the post between them, and four legs from hip to foot."""
-    values, to_world = world.params.values, _rotation(row.q_WB)
+    values, to_world = world.params.values, rotation(row.q_WB)
     top, bottom = values["prop_plate.center_z"], values["base_plate.center_z"]
     shapes_B = (
         ([[-values["prop_plate.size_x"] / 2, 0, top], [values["prop_plate.size_x"] / 2, 0, top]], 2.0),
@@ -141,7 +141,7 @@ def _side(world: World, points_W_m: FloatArray) -> FloatArray:
     return np.column_stack([points_W_m[..., 0], points_W_m[..., 2] - height_m])
 
 
-def _rotation(q: FloatArray) -> FloatArray:
+def rotation(q: FloatArray) -> FloatArray:
     """Rotation matrix body to world of the unit quaternion x, y, z, w."""
     x, y, z, w = q
     return np.array(
