@@ -24,9 +24,10 @@ LIBRARY_ENV = "IVL_NATIVE_LIBRARY"  # another build of the library, for example 
 DEFAULT_LIBRARY = Path(__file__).parent / "_native" / "libivl_sil.so"
 
 TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED = range(5)
+LAYOUT_RECORD_HEADER, LAYOUT_RECORD_ROW, LAYOUT_CONFIG, LAYOUT_LOGS = range(0x100, 0x104)
 _ERROR_BYTES = 256
 _TRACE_ROWS = 1024  # first guess; the call says when it needs more
-_FIELD_TYPES = {"f8": 8, "f4": 4, "i4": 4, "u4": 4, "u8": 8, "i8": 8, "i1": 1, "u1": 1}
+_FIELD_TYPES = {"f8": 8, "f4": 4, "i4": 4, "u4": 4, "u8": 8, "i8": 8, "i2": 2, "u2": 2, "i1": 1, "u1": 1}
 
 
 @dataclass(frozen=True)
@@ -98,9 +99,9 @@ class NativeLibrary:
         self.trace_fields, self.trace_dtype = self._table(TABLE_TRACE)
         self.derived_fields, self.derived_dtype = self._table(TABLE_DERIVED)
 
-    def _fields(self, table: int) -> tuple[tuple[Field, ...], int]:
+    def _fields(self, table: int, call: str = "ivl_sil_table") -> tuple[tuple[Field, ...], int]:
         n_fields, item_size = ctypes.c_uint32(), ctypes.c_uint32()
-        rows = self._c.ivl_sil_table(table, ctypes.byref(n_fields), ctypes.byref(item_size))
+        rows = getattr(self._c, call)(table, ctypes.byref(n_fields), ctypes.byref(item_size))
         if not rows:
             raise NativeError(f"{self.path}: table {table} is missing")
         return tuple(_field(rows[i]) for i in range(n_fields.value)), item_size.value
@@ -108,6 +109,15 @@ class NativeLibrary:
     def _table(self, table: int) -> tuple[Mapping[str, Field], np.dtype[np.void]]:
         fields, item_size = self._fields(table)
         return {f.name: f for f in fields}, _dtype(fields, item_size)
+
+    def layout(self, code: int) -> tuple[Mapping[str, Field], np.dtype[np.void]]:
+        """Fields of a packet of the app channel, by its type, or of a record of the vehicle (`LAYOUT_...`)."""
+        fields, item_size = self._fields(code, "ivl_sil_layout")
+        return {f.name: f for f in fields}, _dtype(fields if item_size else (), item_size)
+
+    def wire_version(self) -> int:
+        """Version that the second byte of each packet of the app channel has."""
+        return int(self._c.ivl_sil_wire_version())
 
     @property
     def c(self) -> Any:
@@ -129,6 +139,10 @@ class NativeLibrary:
     def phase_name(self, code: int) -> str:
         """Name of a trace row's `phase`."""
         return bytes(self._c.ivl_sil_phase_name(code)).decode()
+
+    def rule_name(self, code: int) -> str:
+        """Name of a safety rule of the flight core."""
+        return bytes(self._c.ivl_sil_rule_name(code)).decode()
 
 
 class NativeModel:
@@ -163,6 +177,12 @@ class NativeModel:
         record = np.zeros(1, dtype=self._library.derived_dtype)
         self._library._c.ivl_sil_model_derived(self._handle, _pointer(record))
         return record
+
+    def config(self) -> tuple[npt.NDArray[np.void], int]:
+        """The flight core's configuration, one record of the layout `LAYOUT_CONFIG`, and its CRC-32."""
+        record = np.zeros(1, dtype=self._library.layout(LAYOUT_CONFIG)[1])
+        crc = self._library._c.ivl_sil_model_config(self._handle, _pointer(record))
+        return record, int(crc)
 
     def rollouts(self, specs: npt.NDArray[np.void], n_threads: int) -> npt.NDArray[np.void]:
         """Fly `specs` (1-D, `spec_dtype`); returns the outcomes in the same order, same bits for any `n_threads`."""
@@ -213,6 +233,10 @@ def _declare(c: Any) -> None:
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_end_reason", ctypes.c_char_p, (c_int,)),
+        ("ivl_sil_rule_name", ctypes.c_char_p, (c_int,)),
+        ("ivl_sil_layout", ctypes.POINTER(_CField), (c_int, u32p, u32p)),
+        ("ivl_sil_wire_version", c_int, ()),
+        ("ivl_sil_model_config", ctypes.c_uint32, (ptr, ptr)),
         ("ivl_sil_phase_name", ctypes.c_char_p, (c_int,)),
     ):
         function = getattr(c, name)
