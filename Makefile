@@ -208,7 +208,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/pil/*.[ch] tests/c/*.[ch] tests/stm32/*.c tests/app/*.[ch] tests/app/sdk/*.h)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/pil/*.[ch] tests/c/*.[ch] tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
 
 # set-up, each step once
 

@@ -1,20 +1,20 @@
 # The Crazyflie app without its SDK.  Called by the Makefile as
 #     make -f tools/app.mk <target>
 # Targets: check (host: unit tests on a stand-in for the SDK), objects (Cortex-M4F: core and app with the SDK's own flags, and their sizes).
-# tests/app/sdk declares what the app uses of the SDK; docs/FIRMWARE.md says when it was last linked against the real one.
+# firmware/sdk declares what the app uses of the SDK; docs/FIRMWARE.md says when it was last linked against the real one.
 
 CROSS ?= arm-none-eabi-
 UNITY := build/unity
 
 SOURCES := $(wildcard firmware/core/*.c firmware/app/*.c)
-HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h tests/app/sdk/*.h)
+HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h firmware/sdk/*.h)
 
 # ---- host: sanitizers on, strict warnings on our own files
 
 HOST       := build/app
 HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=all \
               -Wall -Wextra -Wdouble-promotion -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes -Werror \
-              -DSDK_DOUBLE -Ifirmware/core -Ifirmware/app -Itests/app -isystem tests/app/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
+              -DSDK_ON_HOST -Ifirmware/core -Ifirmware/app -Itests/app -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
 HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) tests/app/sdk_double.c tests/app/test_app.c tests/c/default_fixture.c)
 
 # ---- Cortex-M4F: the SDK's flags, and the one of our Kbuild files
@@ -22,9 +22,9 @@ HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) tests/app/sdk_double.c tests
 ARM       := build/firmware
 ARM_FLAGS := -Os -Werror -Wall -Wmissing-braces -fno-strict-aliasing -std=gnu11 -fno-math-errno -Wdouble-promotion -ffunction-sections \
              -fdata-sections -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -g3 -ffp-contract=off -fstack-usage \
-             -Ifirmware/core -Ifirmware/app -isystem tests/app/sdk
+             -Ifirmware/core -Ifirmware/app -isystem firmware/sdk
 ARM_OBJ   := $(patsubst firmware/%.c,$(ARM)/%.o,$(SOURCES))
-# what the objects may ask of the world: the SDK's functions that tests/app/sdk declares, and these of the C library
+# what the objects may ask of the world: the SDK's functions that firmware/sdk declares, and these of the C library
 LIBRARY   := memcpy|memset|memcmp|memmove|strlen
 
 .DELETE_ON_ERROR:

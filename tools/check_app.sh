@@ -2,7 +2,7 @@
 # Looks at the Cortex-M4F objects of core and app, and prints their sizes.
 # usage: check_app.sh CROSS_PREFIX LIBRARY_FUNCTIONS OBJECT_FOLDER
 #
-# Nothing is called but what core and app define, what tests/app/sdk declares, and the listed functions of the C library (so no double,
+# Nothing is called but what core and app define, what firmware/sdk declares, and the listed functions of the C library (so no double,
 # no libm, no heap); no multiplication is fused with an addition; no frame in the stabilizer's task is larger than 256 bytes.
 set -eu
 cross=$1 library=$2 folder=$3
@@ -15,7 +15,7 @@ fail() {
 }
 
 "${cross}nm" --defined-only --format=posix "$folder"/*/*.o | awk 'NF > 1 {print $1}' | sort -u > "$folder/defined.txt"
-grep -ohwE '[a-zA-Z_][a-zA-Z0-9_]*' tests/app/sdk/*.h | sort -u > "$folder/declared.txt"
+grep -ohwE '[a-zA-Z_][a-zA-Z0-9_]*' firmware/sdk/*.h | sort -u > "$folder/declared.txt"
 found=$("${cross}nm" --undefined-only --format=posix "$folder"/*/*.o | awk 'NF > 1 {print $1}' | sort -u | grep -vxE "$library|tumbleCheckEnabled" |
     grep -vxFf "$folder/defined.txt" | grep -vxFf "$folder/declared.txt" | tr '\n' ' ' || true)
 [ -z "$found" ] || fail "$folder: calls to functions that are not declared: $found"

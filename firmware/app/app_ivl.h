@@ -43,6 +43,21 @@ typedef enum
     APP_OWNER_CORE
 } app_owner_t;
 
+typedef enum
+{
+    APP_WAITS_FOR_NOTHING,
+    APP_WAITS_FOR_POLICY,
+    APP_WAITS_FOR_COMMAND
+} app_waits_t;
+
+/// A packet that is being put in force.
+typedef struct
+{
+    app_waits_t what;
+    uint32_t    seq;
+    uint32_t    since_ms;
+} app_pending_t;
+
 /// Written by the stabilizer's task alone, unless a line says otherwise; others may read single numbers for logs.
 typedef struct
 {
@@ -81,9 +96,45 @@ typedef struct
     app_config_result_t config_result;               ///< last one, for logs; written by the app's task
     uint32_t            config_crc;                  ///< of the configuration in force; written by the app's task
     uint32_t            n_bad_packet;                ///< packets that were none of ours; written by the app's task
+    app_pending_t       pending;                     ///< of the app's task
+    int                 n_config_polls;              ///< of the app's task: how often a commit was found waiting
 } app_t;
 
 extern app_t ivl_app;
+
+// ---- the stabilizer's task, in every port (app_tick.c)
+
+/// Start or restart the core.  After a restart in the air, motors stay with it, and off, until the vehicle has rested.
+void app_start_core(app_t *app);
+
+/// Empty the mailboxes of the other tasks; once a millisecond.
+void app_take_requests(app_t *app, uint64_t now_us);
+
+/// What the core is told about the vehicle beside its motion; before app_step.
+void app_look_around(app_t *app, bool stock_idle, float setpoint_age_s, uint64_t now_us);
+
+/// One tick of the core on app->in, its row of the recorder, and the tumble check.
+void app_step(app_t *app);
+
+/// The core drives in this call: what is to be added to each motor while a step of thrust fades, as a share of the largest.
+/// @param[in] mean_norm  mean thrust that the core asks for
+/// @param[in] loop_s     time between two calls
+float app_fade_into_core(app_t *app, float mean_norm, float loop_s);
+
+/// The stock controller drives in this call: its thrust, with what fades; none stays none.
+float app_fade_into_stock(app_t *app, float norm, float loop_s);
+
+// ---- asked of the port
+
+/// True if the stabilizer can run the core at this rate.
+bool app_has_rate(float tick_hz);
+
+// ---- the app's task (app_main.c)
+
+void app_task_start(void);
+
+/// Wait for a packet, for a few milliseconds at most, and do what is to be done.
+void app_task_once(void);
 
 /// Fill a mailbox if it is empty.  @return true if it was
 #define app_put(box, what) (atomic_load(&(box)->full) ? false : ((box)->value = (what), atomic_store(&(box)->full, true), true))
@@ -104,9 +155,12 @@ void app_memory_register(void);
 /// The tumble check of the SDK's supervisor: off in flip and coast only.
 void app_tumble_check_set(ivl_phase_t phase);
 
-/// One packet of the host, in the app's task: put it in force and answer.
+/// One packet of the host, in the app's task: hand it to the stabilizer's task.  Not while app_packets_waiting.
 void app_packets_handle(app_t *app, const uint8_t *bytes, size_t size);
 
-/// Answer a commit of the configuration, if one has been done or cannot be.
-void app_packets_poll_config(app_t *app);
+/// True while the stabilizer's task has yet to take what a packet asked for.
+bool app_packets_waiting(const app_t *app);
+
+/// Answer what has been done or cannot be; once a millisecond while app_packets_waiting, else every few.
+void app_packets_poll(app_t *app);
 #endif  // APP_IVL_H

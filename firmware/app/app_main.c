@@ -27,6 +27,8 @@ typedef struct
     ivl_phase_t  last_phase;
 } main_t;
 
+static main_t task;
+
 static float variance_m2(logVarId_t id)
 {
     return logVarIdIsValid(id) ? logGetFloat(id) : NAN;
@@ -60,27 +62,48 @@ static void hold_where_handed_back(app_t *app)
     }
 }
 
-void appMain(void)
+static void receive(app_t *app)
 {
-    app_t *const app = &ivl_app;
-    main_t       m = {
+    uint8_t      bytes[APPCHANNEL_MTU];
+    const size_t n = appchannelReceiveDataPacket(bytes, sizeof bytes, PERIOD_MS);
+    if (n > 0u)
+    {
+        app_packets_handle(app, bytes, n);
+    }
+}
+
+void app_task_start(void)
+{
+    task = (main_t){
         .variance = {logGetVarId("kalman", "varPX"), logGetVarId("kalman", "varPY"), logGetVarId("kalman", "varPZ")},
         .bypass = paramGetVarId("motorPowerSet", "enable"),
     };
     app_tumble_check_set(IVL_PHASE_IDLE);
     DEBUG_PRINT("Inverted landing ready\n");
+}
 
+void app_task_once(void)
+{
+    app_t *const app = &ivl_app;
+    if (app_packets_waiting(app))
+    {
+        vTaskDelay(M2T(1));
+    }
+    else
+    {
+        receive(app);
+    }
+    app_packets_poll(app);
+    look_up(app, &task);
+    give_up_old_setpoint(&task, app->state.phase);
+    hold_where_handed_back(app);
+}
+
+void appMain(void)
+{
+    app_task_start();
     for (;;)
     {
-        uint8_t      bytes[APPCHANNEL_MTU];
-        const size_t n = appchannelReceiveDataPacket(bytes, sizeof bytes, PERIOD_MS);
-        if (n > 0u)
-        {
-            app_packets_handle(app, bytes, n);
-        }
-        app_packets_poll_config(app);
-        look_up(app, &m);
-        give_up_old_setpoint(&m, app->state.phase);
-        hold_where_handed_back(app);
+        app_task_once();
     }
 }

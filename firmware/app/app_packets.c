@@ -8,8 +8,12 @@
 #define DEBUG_MODULE "IVL"
 #include "debug.h"
 
-// a controller that runs takes a mailbox within a tick; this is long enough to be sure that none does
-#define WAIT_MS_MAX 20
+// a controller that runs takes a mailbox within a millisecond; this is long enough to be sure that none does
+#define POLICY_MS_MAX 20u
+// ... and this is long enough for a tick at 500 Hz to act on a command, so that the echo tells what it led to
+#define COMMAND_MS 3u
+// the same for a commit, which the task only looks at in passing
+#define CONFIG_POLLS_MAX 20
 
 // not blocking: when nobody listens, an echo is lost, and the host asks again
 static void reply(uint8_t *bytes, size_t size)
@@ -17,25 +21,57 @@ static void reply(uint8_t *bytes, size_t size)
     (void)appchannelSendDataPacket(bytes, size);
 }
 
-// what is in force is asked of the stabilizer's task, so that the three values belong together
+static void begin_wait(app_t *app, app_waits_t what, uint32_t seq)
+{
+    app->pending = (app_pending_t){what, seq, T2M(xTaskGetTickCount())};
+}
+
+static uint32_t waited_ms(const app_t *app)
+{
+    return T2M(xTaskGetTickCount()) - app->pending.since_ms;
+}
+
+// ---- policy
+
 static void handle_policy(app_t *app, const ivl_wire_policy_t *packet)
 {
-    const ivl_policy_t     policy = {packet->seq, packet->rrev_c_per_s, packet->moment_y_Nm};
-    ivl_wire_policy_echo_t echo = {.seq = packet->seq, .status = IVL_WIRE_ERR_NO_CONTROLLER};
-    bool                   answered = false;
+    const ivl_policy_t policy = {packet->seq, packet->rrev_c_per_s, packet->moment_y_Nm};
     (void)app_put(&app->policy_in, policy);
-    for (int ms = 0; !answered && (ms < WAIT_MS_MAX); ms++)
+    begin_wait(app, APP_WAITS_FOR_POLICY, packet->seq);
+}
+
+// what is in force is asked of the stabilizer's task, so that the three values belong together
+static void poll_policy(app_t *app)
+{
+    ivl_wire_policy_echo_t echo = {.seq = app->pending.seq, .status = IVL_WIRE_ERR_NO_CONTROLLER};
+    if (!app_take(&app->policy_out, &echo))
     {
-        vTaskDelay(M2T(1));
-        answered = app_take(&app->policy_out, &echo);
-    }
-    if (!answered)
-    {
+        if (waited_ms(app) < POLICY_MS_MAX)
+        {
+            return;
+        }
         // taken back, so that it does not come into force some other day
         atomic_store(&app->policy_in.full, false);
     }
+    app->pending.what = APP_WAITS_FOR_NOTHING;
     uint8_t bytes[IVL_WIRE_SIZE_MAX];
     reply(bytes, ivl_wire_put_policy_echo(bytes, &echo));
+}
+
+// ---- command
+
+static void echo_command(app_t *app, uint16_t seq, int8_t status)
+{
+    const ivl_wire_command_echo_t echo = {
+        .seq = seq,
+        .status = status,
+        .request = (uint8_t)app->in.cmd.request,
+        .phase = app->out.phase_log,
+        .rule = app->state.guard.rule,
+        .cause = app->state.guard.cause,
+    };
+    uint8_t bytes[IVL_WIRE_SIZE_MAX];
+    reply(bytes, ivl_wire_put_command_echo(bytes, &echo));
 }
 
 static void handle_command(app_t *app, const ivl_wire_command_t *packet)
@@ -46,29 +82,35 @@ static void handle_command(app_t *app, const ivl_wire_command_t *packet)
         .speed_mps = packet->speed_mps,
         .angle_rad = packet->angle_rad,
     };
-    const bool is_good = ivl_sense_command_good(&app->cfg, &command);
-    const bool is_put = is_good && app_put(&app->command_in, command);
-    int8_t     status = is_put ? IVL_WIRE_OK : IVL_WIRE_ERR_NO_CONTROLLER;
-    status = is_good ? status : IVL_WIRE_ERR_RANGE;
-    if (is_put)
+    if (!ivl_sense_command_good(&app->cfg, &command))
     {
-        // the stabilizer's task empties the mailbox once a millisecond
-        vTaskDelay(M2T(3));
-        if (atomic_exchange(&app->command_in.full, false))
-        {
-            status = IVL_WIRE_ERR_NO_CONTROLLER;
-        }
+        echo_command(app, packet->seq, IVL_WIRE_ERR_RANGE);
     }
-    const ivl_wire_command_echo_t echo = {
-        .seq = packet->seq,
-        .status = status,
-        .request = (uint8_t)app->in.cmd.request,
-        .phase = app->out.phase_log,
-        .rule = app->state.guard.rule,
-        .cause = app->state.guard.cause,
-    };
-    uint8_t bytes[IVL_WIRE_SIZE_MAX];
-    reply(bytes, ivl_wire_put_command_echo(bytes, &echo));
+    else if (!app_put(&app->command_in, command))
+    {
+        echo_command(app, packet->seq, IVL_WIRE_ERR_NO_CONTROLLER);
+    }
+    else
+    {
+        begin_wait(app, APP_WAITS_FOR_COMMAND, packet->seq);
+    }
+}
+
+static void poll_command(app_t *app)
+{
+    if (waited_ms(app) >= COMMAND_MS)
+    {
+        const bool is_left = atomic_exchange(&app->command_in.full, false);
+        app->pending.what = APP_WAITS_FOR_NOTHING;
+        echo_command(app, (uint16_t)app->pending.seq, is_left ? IVL_WIRE_ERR_NO_CONTROLLER : IVL_WIRE_OK);
+    }
+}
+
+// ---- all
+
+bool app_packets_waiting(const app_t *app)
+{
+    return app->pending.what != APP_WAITS_FOR_NOTHING;
 }
 
 void app_packets_handle(app_t *app, const uint8_t *bytes, size_t size)
@@ -104,22 +146,34 @@ static void tell_config(app_t *app, app_config_result_t result)
     reply(bytes, ivl_wire_put_config_echo(bytes, &echo));
 }
 
-void app_packets_poll_config(app_t *app)
+static void poll_config(app_t *app)
 {
-    static int          n_waiting;
     app_config_result_t result;
     if (app_take(&app->config_out, &result))
     {
-        n_waiting = 0;
+        app->n_config_polls = 0;
         tell_config(app, result);
         return;
     }
-    n_waiting = atomic_load(&app->config_in.full) ? n_waiting + 1 : 0;
-    if (n_waiting > WAIT_MS_MAX)
+    app->n_config_polls = atomic_load(&app->config_in.full) ? app->n_config_polls + 1 : 0;
+    if (app->n_config_polls > CONFIG_POLLS_MAX)
     {
-        n_waiting = 0;
+        app->n_config_polls = 0;
         result = (app_config_result_t){app->config_in.value.seq, IVL_WIRE_ERR_NO_CONTROLLER, APP_CONFIG_NONE};
         atomic_store(&app->config_in.full, false);
         tell_config(app, result);
     }
+}
+
+void app_packets_poll(app_t *app)
+{
+    if (app->pending.what == APP_WAITS_FOR_POLICY)
+    {
+        poll_policy(app);
+    }
+    else if (app->pending.what == APP_WAITS_FOR_COMMAND)
+    {
+        poll_command(app);
+    }
+    poll_config(app);
 }

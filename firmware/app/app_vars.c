@@ -27,13 +27,7 @@ _Static_assert(ROW_COUNT < (int)APP_CONFIG_NONE, "a row fits into a byte");
 // what this platform cannot do; -1 if it can do all
 static int bad_for_platform(const ivl_cfg_t *cfg)
 {
-    const float rates_hz[] = {RATE_1000_HZ, RATE_500_HZ, RATE_250_HZ};
-    bool        has_rate = false;
-    for (size_t i = 0; i < sizeof rates_hz / sizeof rates_hz[0]; i++)
-    {
-        has_rate = has_rate || ((cfg->tick_hz >= rates_hz[i]) && (cfg->tick_hz <= rates_hz[i]));
-    }
-    if (!has_rate)
+    if (!app_has_rate(cfg->tick_hz))
     {
         return ROW_tick_hz;
     }

@@ -256,7 +256,7 @@ void memoryRegisterHandler(const MemoryHandlerDef_t *handlerDef)
     sdk.n_memory++;
 }
 
-void sdk_double_print(const char *format, ...)
+void sdk_print(const char *format, ...)
 {
     strncpy(sdk.printed, format, sizeof sdk.printed - 1u);
 }

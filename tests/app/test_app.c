@@ -56,11 +56,22 @@ static ivl_wire_config_echo_t commit(uint32_t seq)
     return echo;
 }
 
+/// What the app's task does with a packet until it is in force or cannot be.
+static void handle(const uint8_t *bytes, size_t size)
+{
+    app_packets_handle(&ivl_app, bytes, size);
+    while (app_packets_waiting(&ivl_app))
+    {
+        sdk_double_run(1);
+        app_packets_poll(&ivl_app);
+    }
+}
+
 static ivl_wire_policy_echo_t send_policy(uint32_t seq, float rrev, float moment)
 {
     const ivl_wire_policy_t packet = {seq, rrev, moment};
     uint8_t                 bytes[IVL_WIRE_SIZE_MAX];
-    app_packets_handle(&ivl_app, bytes, ivl_wire_put_policy(bytes, &packet));
+    handle(bytes, ivl_wire_put_policy(bytes, &packet));
     ivl_wire_policy_echo_t echo = {0};
     TEST_ASSERT_TRUE(ivl_wire_get_policy_echo(last_sent()->bytes, last_sent()->size, &echo));
     TEST_ASSERT_EQUAL_UINT32(seq, echo.seq);
@@ -73,7 +84,7 @@ static ivl_wire_command_echo_t send_command(ivl_request_t request)
     const ivl_wire_command_t packet = {++seq, (uint8_t)request, 0.0f, 0.0f, 1.0f, 2.5f, 1.2f};
     uint8_t                  bytes[IVL_WIRE_SIZE_MAX];
     sdk.n_sent = 0;
-    app_packets_handle(&ivl_app, bytes, ivl_wire_put_command(bytes, &packet));
+    handle(bytes, ivl_wire_put_command(bytes, &packet));
     ivl_wire_command_echo_t echo = {0};
     TEST_ASSERT_TRUE(ivl_wire_get_command_echo(last_sent()->bytes, last_sent()->size, &echo));
     TEST_ASSERT_EQUAL_UINT16(seq, echo.seq);
@@ -604,7 +615,7 @@ static void test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat(void
         const ivl_wire_command_t packet = {.seq = 5, .request = IVL_REQUEST_HOVER, .hover_x_m = NAN};
         uint8_t                  bytes[IVL_WIRE_SIZE_MAX];
         sdk.n_sent = 0;
-        app_packets_handle(&ivl_app, bytes, ivl_wire_put_command(bytes, &packet));
+        handle(bytes, ivl_wire_put_command(bytes, &packet));
         ivl_wire_command_echo_t echo = {0};
         TEST_ASSERT_TRUE(ivl_wire_get_command_echo(last_sent()->bytes, last_sent()->size, &echo));
         TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_RANGE, echo.status);
@@ -656,12 +667,12 @@ static void test_noise_on_the_channel_starts_no_motor_and_breaks_nothing(void)
             bytes[0] = (uint8_t)(1u + dice);
             bytes[1] = (uint8_t)IVL_WIRE_VERSION;
             bytes[4] = ((bytes[4] & 1u) != 0u) ? (uint8_t)IVL_REQUEST_ABORT : (uint8_t)(4u + bytes[4] % 250u);
-            app_packets_handle(&ivl_app, bytes, (dice == 0u) ? 14u : 25u);
+            handle(bytes, (dice == 0u) ? 14u : 25u);
             TEST_ASSERT_EQUAL_INT(1, sdk.n_sent);
         }
         else
         {
-            app_packets_handle(&ivl_app, bytes, size);
+            handle(bytes, size);
         }
         TEST_ASSERT_FALSE(ivl_app.out.motors_on);
         TEST_ASSERT_TRUE(!ivl_app.state.has_policy ||

@@ -33,7 +33,7 @@ struct log_s
 
 #define LOG_ADD(TYPE, NAME, ADDRESS) {.type = TYPE, .name = #NAME, .address = (void *)(ADDRESS)},
 
-#ifdef SDK_DOUBLE
+#ifdef SDK_ON_HOST
 #define LOG_STORAGE                                                                                                                        \
     extern struct log_s sdk_logs_ivl[];                                                                                                    \
     struct log_s

@@ -36,7 +36,7 @@ struct param_s
     {.type = TYPE, .name = #NAME, .address = (void *)(ADDRESS), .callback = CALLBACK},
 #define PARAM_ADD_GROUP(TYPE, NAME) {.type = TYPE, .name = #NAME},
 
-#ifdef SDK_DOUBLE
+#ifdef SDK_ON_HOST
 #define PARAM_STORAGE                                                                                                                      \
     extern struct param_s sdk_params_ivl[];                                                                                                \
     struct param_s
