@@ -1,0 +1,69 @@
+"""`ivl report`."""
+
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from ivl.cli import console
+from ivl.errors import IvlError
+
+HELP = """Write the page of a RUN: one HTML file to explore, to keep and to mail.
+
+RUN is a run folder of `ivl learn` or `ivl sweep`. The page needs no network and no installation: landing rates, policy
+region and convergence to turn and to click, and landings replayed in 3-D, two side by side.
+
+\b
+Examples:
+  ivl report runs/paper_vertical-bo-seed0
+      writes report.html into the run folder
+  ivl report runs/paper --out paper.html --open
+      another file, and look at it at once
+  ivl report runs/paper --landings 200
+      fewer landings, a smaller file
+"""
+
+
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.")],
+    out: Annotated[Path | None, typer.Option(help="File to write; default: report.html in RUN.")] = None,
+    landings: Annotated[int, typer.Option(help="Carry at most this many landings.", min=1, max=100_000)] = 1500,
+    open_: Annotated[bool, typer.Option("--open", help="Open the page in the web browser.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
+) -> None:
+    """Write a report; HELP is the text that people see."""
+    try:
+        from ivl import report as reports  # plotly and pandas take a second to load
+    except ModuleNotFoundError as error:
+        raise IvlError(f"{error.name} is not installed: pip install 'ivl[report,sweep]'") from error
+    columns = (TextColumn("flying landings again"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=console.err, transient=True) as progress:
+        task = progress.add_task("", total=None)
+        made = reports.write(run, out, landings, lambda done, n: progress.update(task, completed=done, total=n))
+    if made.n_different:
+        console.err.print(
+            f"{made.n_different} of {made.n_landings} landings differ from what the run recorded: "
+            "it was flown by another version of the simulator",
+            style="yellow",
+            highlight=False,
+            soft_wrap=True,
+        )
+    if as_json:
+        console.print_json(
+            {
+                "path": str(made.path),
+                "size_bytes": made.size_bytes,
+                "landings": made.n_landings,
+                "landings_that_differ": made.n_different,
+            }
+        )
+    else:
+        console.out.print(
+            f"{made.path}: {made.size_bytes / 1e6:.1f} MB, {made.n_landings} landings to replay",
+            highlight=False,
+            soft_wrap=True,
+        )
+    if open_ and not webbrowser.open(made.path.resolve().as_uri()):
+        raise IvlError(f"{made.path}: no web browser was found to open it with")

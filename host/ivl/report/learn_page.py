@@ -1,0 +1,146 @@
+"""What the page of an `ivl learn` run shows: convergence, every rollout of the first trial to replay, best and worst."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ivl import campaign, landing, native
+from ivl.experiment import POLICY, Experiment
+from ivl.outcome import four_leg
+from ivl.plots.convergence import outcome_classes
+from ivl.report import replay
+from ivl.report.landings import Album, thinned
+from ivl.report.page import encode, flatten
+from ivl.store import SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest
+
+
+def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], None]) -> tuple[dict[str, Any], Album]:
+    """Data of the page, and its landings.
+
+    Args:
+        folder: Run folder.
+        n_landings_max: Most landings that the page carries.
+        on_landing: Called with (done, all) after each landing that was flown again.
+
+    Raises:
+        StoreError: The folder holds no run, or another process is working on it.
+    """
+    experiment, n_trials = campaign.read_config(folder)
+    with RunStore.open_existing(folder, native.library().outcome_dtype) as store:
+        history, rollouts = store.episodes(), store.rollouts(trial=0)
+    album, numbers = Album(), np.full(len(rollouts), -1)
+    scored = np.flatnonzero(rollouts.status == SCORED)
+    notable = _notable(rollouts, scored)
+    chosen = thinned(scored.tolist(), n_landings_max) | {row for _, row in notable}
+    for done, row in enumerate(sorted(chosen), 1):
+        numbers[row] = album.add(_spec(experiment, rollouts, row), f"rollout {row}", _is_recorded(rollouts, row))
+        on_landing(done, len(chosen))
+    data = {
+        "title": f"Inverted landing: {experiment.name}",
+        "subtitle": experiment.doc,
+        "facts": [*_facts(experiment, n_trials or 1, folder), album.fact()],
+        "manifest": flatten(read_manifest(folder)),
+        "claims": None,
+        "scale": replay.SCALE,
+        "geometry": album.geometry,
+        "landings": album.landings,
+        "learn": {
+            "episodes": [_episodes(experiment, history, trial) for trial in range(n_trials or 1)],
+            "rollouts": _rollouts(rollouts, numbers),
+            "limits": _limits(experiment, rollouts),
+            "notable": [{"what": what, "landing": int(numbers[row])} for what, row in notable],
+            "first_shown": [0, max(0, len(notable) - 2)],
+        },
+    }
+    return data, album
+
+
+def _spec(experiment: Experiment, rollouts: RolloutRows, row: int) -> landing.LandingSpec:
+    theta = (float(rollouts.theta[row, 0]), float(rollouts.theta[row, 1]))
+    return landing.of_rollout(experiment, int(rollouts.trial[row]), theta, int(rollouts.stream[row]))
+
+
+def _is_recorded(rollouts: RolloutRows, row: int) -> Callable[[Any], bool]:
+    """Whether an outcome is the stored one, number for number (the store does not keep the sign of a zero)."""
+    stored = rollouts.outcomes[row]
+    names = stored.dtype.names
+
+    def same(record: Any) -> bool:
+        return all(np.array_equal(record[n], stored[n], equal_nan=stored.dtype[n].base.kind == "f") for n in names)
+
+    return same
+
+
+def _notable(rollouts: RolloutRows, scored: Any) -> list[tuple[str, int]]:
+    """Rollouts worth a look, best first."""
+    reward, landed = rollouts.reward[scored], four_leg(rollouts.outcomes[scored])
+    touched = np.isfinite(rollouts.outcomes["t_impact_s"][scored])
+    found = [("best return", int(scored[np.argmax(reward)]))]
+    if landed.any():
+        found += [("first on four legs", int(scored[landed][0])), ("last on four legs", int(scored[landed][-1]))]
+    found.append(("last rollout", int(scored[-1])))
+    if touched.any():
+        found.append(("worst that touched the ceiling", int(scored[touched][np.argmin(reward[touched])])))
+    return [*found, ("worst return", int(scored[np.argmin(reward)]))]
+
+
+def _facts(experiment: Experiment, n_trials: int, folder: Path) -> list[list[str]]:
+    facts = [
+        ["Vehicle and gear", f"{experiment.vehicle}, {experiment.gear_set}/{experiment.gear}"],
+        ["Approach", f"{experiment.speed_mps:g} m/s at {experiment.angle_deg:g}°"],
+        ["Learner", experiment.learner.name],
+        ["Rollouts", f"{experiment.budget} in episodes of {experiment.n_rollouts}"],
+        ["Seed", str(experiment.seed) if n_trials == 1 else f"{experiment.seed} and on, {n_trials} trials"],
+    ]
+    return facts + _verdict(folder / "result.json", n_trials)
+
+
+def _verdict(path: Path, n_trials: int) -> list[list[str]]:
+    """Whether the trial was solved; nothing if the run has not been judged yet."""
+    if not path.is_file():
+        return [["Verdict", "not judged: the run was cut off"]]
+    verdicts = json.loads(path.read_text(encoding="utf-8"))["verdicts"]
+    solved = [verdict["rollouts_to_convergence"] for verdict in verdicts if verdict["solved"]]
+    if n_trials > 1:
+        return [["Solved", f"{len(solved)} of {n_trials} trials"]]
+    return [["Solved", f"after {solved[0]} rollouts" if solved else "no"]]
+
+
+def _episodes(experiment: Experiment, history: list[EpisodeRow], trial: int) -> dict[str, Any]:
+    """The search of one trial, from its start on; rate and return begin with the first episode."""
+    own = [row for row in history if row.trial == trial]
+    start = [getattr(experiment.policy, name) for name in POLICY]
+    return {
+        "at": [experiment.n_rollouts * k for k in range(len(own) + 1)],
+        "mu": [encode([start[i].mu0, *(row.mu[i] for row in own)], 1e-3) for i in range(2)],
+        "sigma": [encode([start[i].sigma0, *(row.sigma[i] for row in own)], 1e-3) for i in range(2)],
+        "rate": encode([np.nan, *(row.rate_four_leg for row in own)], 1e-3),
+        "reward": encode([np.nan, *(row.reward_mean for row in own)], 1e-2),
+    }
+
+
+def _rollouts(rollouts: RolloutRows, numbers: Any) -> dict[str, Any]:
+    """Every rollout of the first trial; kind is the place in the list of outcomes, -1 if it was not scored."""
+    kind = np.full(len(rollouts), -1)
+    for number, mask in enumerate(outcome_classes(rollouts)):
+        kind[mask] = number
+    return {
+        "at": list(range(1, len(rollouts) + 1)),
+        "kind": kind.tolist(),
+        "theta": [encode(rollouts.theta[:, i], 1e-3) for i in range(2)],
+        "reward": encode(rollouts.reward, 1e-2),
+        "landing": numbers.tolist(),
+    }
+
+
+def _limits(experiment: Experiment, rollouts: RolloutRows) -> list[list[float]]:
+    """Ranges of the four axes: parameters (bounds and what was flown), rate, return."""
+    limits = []
+    for i, name in enumerate(POLICY):
+        bounds, flown = getattr(experiment.policy, name).bounds, rollouts.theta[:, i]
+        lo, hi = min(bounds[0], flown.min()), max(bounds[1], flown.max())
+        limits.append([float(lo - 0.03 * (hi - lo)), float(hi + 0.03 * (hi - lo))])
+    return [*limits, [-0.03, 1.05], [0.0, 190.0]]

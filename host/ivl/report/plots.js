@@ -1,0 +1,102 @@
+// Figures, by plotly: polar landing rates, the policy region, convergence.
+
+const FONT = { family: "system-ui, sans-serif", size: 12, color: INK };
+const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d", "toImage"] };
+const RATE_SCALE = "Viridis", MOMENT_SCALE = "Cividis";
+const OUTCOMES = [["four legs, clean", GREEN, "circle"], ["four legs, body contact", "#56B4E9", "square"],
+  ["one or two legs", ORANGE, "triangle-up"], ["no leg", VERMILION, "x"]];
+
+const percent = (share) => (share === null || Number.isNaN(share) ? "–" : `${(100 * share).toFixed(0)} %`);
+const readable = (name) => name.replaceAll("_", " ");
+
+// Numbers of a stored column { unit, values }; null is NaN.
+const column = ({ unit, values }) => values.map((value) => (value === null ? NaN : value * unit));
+
+// Widths of the sectors around sorted centres: each reaches half-way to its neighbours.
+function widths(centres) {
+  const gaps = centres.slice(1).map((c, i) => c - centres[i]);
+  const gap = (i) => gaps[Math.min(Math.max(i, 0), gaps.length - 1)] ?? 1;
+  return centres.map((_, i) => (gap(i - 1) + gap(i)) / 2);
+}
+
+// One polar plot a gear: angle of approach around, speed outwards, colour the landing rate.
+function polarFigure(sweep, cells, gears) {
+  const columns = Math.min(3, gears.length), rows = Math.ceil(gears.length / columns);
+  const dv = widths(sweep.speeds), dphi = widths(sweep.angles);
+  const layout = { font: FONT, margin: { l: 8, r: 8, t: 22, b: 8 }, showlegend: false, annotations: [], height: 250 * rows,
+    coloraxis: { cmin: 0, cmax: 1, colorscale: RATE_SCALE, colorbar: { title: { text: "landing rate", side: "right" }, thickness: 12, tickformat: ".0%", len: 0.8 } } };
+  const traces = gears.map((gear, k) => {
+    const own = cells.filter((cell) => cell.gear === gear), name = `polar${k ? k + 1 : ""}`;
+    const [x0, y1] = [(k % columns) / columns, 1 - Math.floor(k / columns) / rows];
+    layout[name] = polarAxes([x0 + 0.025, x0 + 1 / columns - 0.035], [y1 - 1 / rows + 0.09, y1 - 0.05], sweep);
+    layout.annotations.push({ text: `<b>${readable(sweep.gears[gear])}</b>`, x: x0 + 0.5 / columns, y: y1 + 0.012, xref: "paper", yref: "paper", xanchor: "center", yanchor: "top", showarrow: false });
+    return { type: "barpolar", subplot: name, customdata: own.map((cell) => cell.id),
+      r: own.map((cell) => dv[cell.speed]), base: own.map((cell) => sweep.speeds[cell.speed] - dv[cell.speed] / 2),
+      theta: own.map((cell) => sweep.angles[cell.angle]), width: own.map((cell) => dphi[cell.angle]),
+      marker: { color: own.map((cell) => cell.rate), coloraxis: "coloraxis", line: { width: own.map(() => 0.4), color: own.map(() => "#ffffff") } },
+      text: own.map((cell) => `V ${sweep.speeds[cell.speed]} m/s, φ ${sweep.angles[cell.angle]}°<br>rate ${percent(cell.rate)} (95 %: ${percent(cell.lo)} to ${percent(cell.hi)})<br>best trial ${percent(cell.best)}`),
+      hovertemplate: "%{text}<extra></extra>" };
+  });
+  return { traces, layout };
+}
+
+function polarAxes(x, y, sweep) {
+  const top = sweep.speeds[sweep.speeds.length - 1] + widths(sweep.speeds)[sweep.speeds.length - 1] / 2;
+  return { domain: { x, y }, sector: [0, 90], bgcolor: "#f2f4f7",
+    radialaxis: { range: [0, top], angle: 0, tickangle: 0, title: { text: "V (m/s)", font: { size: 10 } }, tickfont: { size: 10 }, nticks: 5, gridcolor: "rgba(0,0,0,0.08)" },
+    angularaxis: { tickvals: [0, 30, 60, 90], ticksuffix: "°", tickfont: { size: 10 }, gridcolor: "rgba(0,0,0,0.08)" } };
+}
+
+// Outline of the chosen cell in all polar plots: that of its gear strong, the same approach of other gears weak.
+function outlineCell(div, cells, chosen) {
+  div.data.forEach((trace, k) => {
+    const own = trace.customdata.map((id) => cells[id]);
+    const same = own.map((cell) => cell.speed === chosen.speed && cell.angle === chosen.angle);
+    const strong = own.map((cell) => cell.id === chosen.id);
+    Plotly.restyle(div, { "marker.line.width": [own.map((_, i) => (strong[i] ? 3.5 : same[i] ? 2 : 0.4))], "marker.line.color": [own.map((_, i) => (strong[i] ? VERMILION : same[i] ? "#e79a6a" : "#ffffff"))] }, [k]);
+  });
+}
+
+// Trigger states of the trials in (RREV, OF_y, d), coloured by landing rate or moment.
+function regionFigure(points, colour) {
+  const byRate = colour === "rate";
+  const trace = { type: "scatter3d", mode: "markers", x: points.rrev, y: points.ofY, z: points.d, customdata: points.cell, text: points.text,
+    hovertemplate: "%{text}<br>RREV %{x:.2f} 1/s, OF_y %{y:.2f} rad/s, d %{z:.3f} m<extra></extra>",
+    marker: { size: 3.2, color: byRate ? points.rate : points.moment, colorscale: byRate ? RATE_SCALE : MOMENT_SCALE, cmin: byRate ? 0 : undefined, cmax: byRate ? 1 : undefined,
+      colorbar: { title: { text: byRate ? "landing rate" : "M_yd (N mm)", side: "right" }, thickness: 12, len: 0.7, tickformat: byRate ? ".0%" : undefined } } };
+  const axis = (text) => ({ title: { text, font: { size: 12 } }, backgroundcolor: "#f7f8fa", gridcolor: "#dfe4ea", showbackground: true });
+  const layout = { font: FONT, height: 460, margin: { l: 0, r: 0, t: 6, b: 0 }, uirevision: "keep",
+    scene: { xaxis: axis("RREV (1/s)"), yaxis: axis("OF_y (rad/s)"), zaxis: axis("d (m)"), camera: { eye: { x: 1.5, y: -1.5, z: 0.9 } }, aspectmode: "cube" } };
+  return { traces: [trace], layout };
+}
+
+const PANELS = [["RREV_c (1/s)", "y"], ["M_yd (N mm)", "y2"], ["rate", "y3"], ["return", "y4"]];
+
+// Search of one trial over its rollouts: mu and mu +- 2 sigma of both parameters, landing rate, return. Thin lines: other trials.
+function convergenceFigure(series, others, rollouts, limits) {
+  const traces = others.flatMap((other) => [other.mu[0], other.mu[1], other.rate, other.reward].map((y, i) => ({ x: other.at, y, yaxis: PANELS[i][1], mode: "lines", line: { color: "#c3cad2", width: 1 }, hoverinfo: "skip", showlegend: false })));
+  [0, 1].forEach((i) => {
+    const band = (sign) => series.mu[i].map((value, k) => value + 2 * sign * series.sigma[i][k]);
+    const common = { x: series.at, yaxis: PANELS[i][1], mode: "lines", line: { color: BLUE, width: 0, shape: "hv" }, hoverinfo: "skip" };
+    traces.push({ ...common, y: band(-1), showlegend: false }, { ...common, y: band(1), fill: "tonexty", fillcolor: "rgba(0,114,178,0.15)", name: "µ ± 2σ", showlegend: i === 0 },
+      { ...common, y: series.mu[i], line: { color: BLUE, width: 2, shape: "hv" }, hoverinfo: "x+y", name: "µ", showlegend: i === 0 });
+  });
+  traces.push({ x: series.at, y: series.rate, yaxis: "y3", mode: "lines+markers", marker: { size: 4 }, line: { color: GREEN, width: 2 }, name: "four-leg rate of the episode", showlegend: false },
+    { x: series.at, y: series.reward, yaxis: "y4", mode: "lines+markers", marker: { size: 4 }, line: { color: BLUE, width: 2 }, name: "mean return of the episode", showlegend: false });
+  if (rollouts) traces.push(...outcomeDots(rollouts));
+  const layout = { font: FONT, height: 560, margin: { l: 62, r: 12, t: 8, b: 70 }, hovermode: "closest", legend: { orientation: "h", y: -0.11 },
+    xaxis: { title: { text: "rollout" }, anchor: "y4", domain: [0, 1], range: [-1, series.at[series.at.length - 1] + 1], zeroline: false } };
+  PANELS.forEach(([title, name], i) => {
+    layout[name.replace("y", "yaxis")] = { title: { text: title }, domain: [[0.72, 1], [0.42, 0.70], [0.21, 0.39], [0, 0.18]][i], zeroline: false, gridcolor: "#e6eaee", range: limits[i] };
+  });
+  return { traces, layout };
+}
+
+// One dot a rollout, colour and shape by outcome; each can be clicked.
+function outcomeDots(rollouts) {
+  return OUTCOMES.flatMap(([name, color, symbol], kind) => [0, 1].map((i) => {
+    const own = rollouts.kind.map((k, n) => (k === kind ? n : -1)).filter((n) => n >= 0);
+    return { x: own.map((n) => rollouts.at[n]), y: own.map((n) => rollouts.theta[i][n]), customdata: own, yaxis: PANELS[i][1], mode: "markers", name, legendgroup: name, showlegend: i === 0,
+      text: own.map((n) => `rollout ${n}: ${name}, return ${rollouts.reward[n].toFixed(1)}`), hovertemplate: "%{text}<extra>click to replay</extra>", marker: { color, symbol, size: 7 } };
+  }));
+}

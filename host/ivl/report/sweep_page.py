@@ -1,0 +1,194 @@
+"""What the page of an `ivl sweep` run shows: landing rates of every cell, its trials and their search, best landings."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd  # type: ignore[import-untyped]
+
+from ivl import reward
+from ivl.analysis.rates import CLEAN_RATE, RATE, SOLVED_RATE, cell_rates
+from ivl.errors import StoreError
+from ivl.landing import LandingSpec
+from ivl.report import replay
+from ivl.report.landings import Album, thinned
+from ivl.report.page import encode, flatten
+from ivl.sweep import store
+from ivl.sweep.config import Sweep, load_sweep
+from ivl.sweep.schema import CELL, TRIAL_KEY
+
+_PLACES = {"gear": "gears", "speed_mps": "speeds", "angle_deg": "angles"}
+_PARAMETERS = {"rrev": "rrev_c_per_s", "moment": "moment_y_Nmm"}
+
+
+def collect(
+    folder: Path, n_landings_max: int, on_landing: Callable[[int, int], None]
+) -> tuple[dict[str, Any], Album]:
+    """Data of the page, and its landings (arguments as `learn_page.collect`).
+
+    Raises:
+        StoreError: The folder holds no sweep, or none of its trials is finished.
+    """
+    manifest, sweep = store.read_manifest(folder), load_sweep(str(folder / "sweep.yaml"))
+    trials, cells = _tables(folder)
+    album = Album()
+    trials["landing"] = _fly(sweep, trials, album, n_landings_max, on_landing)
+    data = {
+        "title": f"Inverted landing: {sweep.name}",
+        "subtitle": sweep.doc,
+        "facts": [*_facts(sweep, trials, cells), album.fact()],
+        "manifest": flatten(manifest),
+        "claims": None,
+        "scale": replay.SCALE,
+        "geometry": album.geometry,
+        "landings": album.landings,
+        "sweep": _encode(sweep, trials, cells, _places(cells), _episodes(folder, sweep, trials)),
+    }
+    return data, album
+
+
+def _tables(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Trials (with the number of their cell) and cells, both in the order of their names."""
+    trials = store.read_trials(folder)
+    if trials.empty:
+        raise StoreError(f"{folder}: none of its trials is finished, there is nothing to report")
+    names = {name: object for name in CELL if isinstance(trials[name].dtype, pd.CategoricalDtype)}
+    trials = trials.astype(names)
+    cells = cell_rates(trials).sort_values(list(CELL), kind="stable").reset_index(drop=True)
+    trials = trials.merge(cells[list(CELL)].assign(cell=np.arange(len(cells))), on=list(CELL), how="inner")
+    return trials.sort_values(list(TRIAL_KEY), kind="stable").reset_index(drop=True), cells
+
+
+def _fly(
+    sweep: Sweep, trials: pd.DataFrame, album: Album, n_max: int, on_landing: Callable[[int, int], None]
+) -> pd.Series:
+    """Number of each trial's best landing on the page, -1 without: that of each cell first, others as far as there is room."""
+    order = trials.sort_values(["cell", "best_reward", RATE], ascending=[True, False, False], kind="stable")
+    flown = order[order["best_stream"] >= 0]
+    firsts, others = flown.groupby("cell").head(1), flown[flown["cell"].duplicated()]
+    chosen = thinned(firsts.index, n_max)
+    chosen |= thinned(others.index, n_max - len(chosen))
+    numbers = pd.Series(-1, index=trials.index)
+    for done, row in enumerate(sorted(chosen), 1):
+        trial = trials.loc[row]
+        label = f"{trial['gear'].replace('_', ' ')}, {trial['speed_mps']:g} m/s at {trial['angle_deg']:g}°, trial {trial['trial']}"
+        numbers[row] = album.add(_spec(sweep, trial), label, _is_recorded(sweep, trial))
+        on_landing(done, len(chosen))
+    return numbers
+
+
+def _spec(sweep: Sweep, trial: pd.Series) -> LandingSpec:
+    """The rollout of a trial with the largest return."""
+    return LandingSpec(
+        vehicle=trial["vehicle"],
+        gear=trial["gear"],
+        gear_set=trial["gear_set"],
+        overrides={name: setting.value for name, setting in sweep.overrides.items()},
+        speed_mps=float(trial["speed_mps"]),
+        angle_deg=float(trial["angle_deg"]),
+        rrev_c_per_s=float(trial["best_rrev_c_per_s"]),
+        moment_y_Nmm=float(trial["best_moment_y_Nmm"]),
+        start=sweep.start,
+        seed=int(trial["seed"]),
+        stream=int(trial["best_stream"]),
+    )
+
+
+def _is_recorded(sweep: Sweep, trial: pd.Series) -> Callable[[Any], bool]:
+    """Whether an outcome has the return, feet and body contact that the table of trials tells, exactly."""
+
+    def same(record: Any) -> bool:
+        terms = reward.by_name(sweep.reward.name)(np.array([record], dtype=record.dtype), sweep.reward.options)
+        found = (float(terms.total[0]), int(record["n_legs"]), int(record["body_contact"]))
+        return found == (trial["best_reward"], trial["best_n_legs"], trial["best_body_contact"])
+
+    return same
+
+
+def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list[str]]:
+    n_solved = int((cells["rate_best_norm"] >= SOLVED_RATE).sum())
+    return [
+        ["Vehicle and gears", f"{sweep.vehicle}, {sweep.gear_set}"],
+        ["Learner", sweep.learner.name],
+        ["Cells and trials", f"{len(cells)} cells, {len(trials)} trials"],
+        ["Rollouts", f"{int(trials['n_rollouts'].sum()):,}"],
+        ["Mean landing rate", f"{100 * cells['rate_mean_norm'].mean():.1f} %"],
+        [f"Cells with a trial of {100 * SOLVED_RATE:.0f} % or more", f"{n_solved} of {len(cells)}"],
+        ["Seed", str(sweep.seed)],
+    ]
+
+
+def _places(cells: pd.DataFrame) -> dict[str, list[Any]]:
+    """Values of gear, speed and angle that occur; the gears in the order of their legs' width and length."""
+    return {name: sorted(cells[name].unique().tolist(), key=_gear_order) for name in _PLACES}
+
+
+def _gear_order(value: Any) -> tuple[Any, ...]:
+    """Short gears before long ones, narrow before wide; numbers by value."""
+    if not isinstance(value, str):
+        return (value,)
+    width = 0 if "extra_narrow" in value else 1 if "narrow" in value else 2
+    return ("long" in value, width, value)
+
+
+def _episodes(folder: Path, sweep: Sweep, trials: pd.DataFrame) -> dict[str, Any]:
+    """The search of every trial, one after the other, each beginning with its start; adds to `trials` where it is."""
+    keys = list(TRIAL_KEY)
+    episodes = store.read_episodes(folder).astype({name: trials[name].dtype for name in CELL})
+    start = trials[keys].assign(episode=-1, rate=np.nan, reward=np.nan)
+    for parameter in _PARAMETERS.values():
+        start[f"mu_{parameter}"] = trials[f"mu0_{parameter}"]
+        start[f"sigma_{parameter}"] = getattr(sweep.policy, parameter).sigma0
+    episodes = episodes.rename(columns={RATE: "rate", "reward_mean": "reward"})
+    both = pd.concat([start, episodes[start.columns]]).sort_values([*keys, "episode"], kind="stable")
+    trials["n_episodes_shown"] = 1 + trials["n_episodes"]
+    trials["first_episode"] = trials["n_episodes_shown"].cumsum() - trials["n_episodes_shown"]
+    return {
+        "at": encode((both["episode"] + 1) * sweep.n_rollouts, 1.0),
+        "mu": [encode(both[f"mu_{name}"], 1e-2) for name in _PARAMETERS.values()],
+        "sigma": [encode(both[f"sigma_{name}"], 1e-2) for name in _PARAMETERS.values()],
+        "rate": encode(both["rate"], 1e-2),
+        "reward": encode(both["reward"], 1.0),
+    }
+
+
+def _encode(
+    sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame, places: dict[str, list[Any]], episodes: dict[str, Any]
+) -> dict[str, Any]:
+    best = trials[trials["landing"] >= 0].groupby("cell")["best_reward"].idxmax()
+    landing = trials.loc[best].set_index("cell")["landing"].reindex(cells.index, fill_value=-1)
+    return {
+        **{stored: places[name] for name, stored in _PLACES.items()},
+        "cells": {
+            **{name.split("_")[0]: [places[name].index(v) for v in cells[name]] for name in _PLACES},
+            "rate": encode(cells["rate_mean_norm"], 1e-3),
+            "lo": encode(cells["rate_low_norm"], 1e-3),
+            "hi": encode(cells["rate_high_norm"], 1e-3),
+            "best": encode(cells["rate_best_norm"], 1e-3),
+            "landing": landing.tolist(),
+        },
+        "trials": _encode_trials(trials),
+        "episodes": episodes,
+        "limits": [*(_limits(sweep, trials, name) for name in _PARAMETERS.values()), [-0.03, 1.05], [0.0, 190.0]],
+    }
+
+
+def _encode_trials(trials: pd.DataFrame) -> dict[str, Any]:
+    plain = {"cell": "cell", "trial": "trial", "landing": "landing"}
+    plain |= {"first_episode": "first_episode", "n_episodes": "n_episodes_shown"}
+    scaled = {"rate": (RATE, 1e-3), "clean": (CLEAN_RATE, 1e-3)}
+    for short, name in _PARAMETERS.items():
+        scaled |= {f"mu_{short}": (f"mu_{name}", 1e-2), f"sigma_{short}": (f"sigma_{name}", 1e-2)}
+    scaled |= {"rrev": ("trigger_rrev_per_s", 1e-3), "of_y": ("trigger_of_y_radps", 1e-3)}
+    scaled |= {"d": ("trigger_d_ceil_m", 1e-4)}
+    return {short: trials[name].astype(int).tolist() for short, name in plain.items()} | {
+        short: encode(trials[name], unit) for short, (name, unit) in scaled.items()
+    }
+
+
+def _limits(sweep: Sweep, trials: pd.DataFrame, name: str) -> list[float]:
+    """Range of a parameter's axis: bounds, and wherever a search ended."""
+    bounds = getattr(sweep.policy, name).bounds
+    lo, hi = min(bounds[0], trials[f"mu_{name}"].min()), max(bounds[1], trials[f"mu_{name}"].max())
+    return [float(lo - 0.03 * (hi - lo)), float(hi + 0.03 * (hi - lo))]
