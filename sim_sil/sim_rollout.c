@@ -33,8 +33,7 @@ static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], 
     cmd->angle_rad = (float)(spec->angle_deg[0] * (IVL_SIM_PI / 180.0));
 }
 
-/// @return false if the flight core refuses the policy
-static bool start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec)
+bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec)
 {
     const ivl_sim_model_t *model = group->model;
     ivl_sim_world_t       *world = &group->world[lane];
@@ -53,7 +52,7 @@ static bool start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec)
     return model->core.commit(group->port, lane, &model->firmware, &world->firmware, &policy) == IVL_OK;
 }
 
-static void clear(ivl_sim_outcome_t *o)
+void ivl_sim_outcome_clear(ivl_sim_outcome_t *o)
 {
     memset(o, 0, sizeof *o);
     double *const fields[] = {o->t_trigger_s,    o->t_impact_s,         o->t_end_s,       o->theta_impact_deg, o->vx_trigger_mps,
@@ -205,10 +204,9 @@ static void trace(ivl_sim_tracer_t *tracer, const ivl_sim_group_t *group, int la
     tracer->n++;
 }
 
-static void tick(ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
+void ivl_sim_rollout_note(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
 {
     const ivl_sim_world_t *world = &group->world[lane];
-    ivl_sim_world_tick(group, lane);
     if (world->firmware.triggered && !o->triggered[0])
     {
         const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
@@ -216,8 +214,25 @@ static void tick(ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
     }
 }
 
+static void tick(ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
+{
+    ivl_sim_world_tick(group, lane);
+    ivl_sim_rollout_note(group, lane, o);
+}
+
+bool ivl_sim_rollout_ended(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
+{
+    ivl_sim_end_t end;
+    const bool    is_over = ended(group, lane, o, &end);
+    if (is_over)
+    {
+        note_end(&group->world[lane], end, o);
+    }
+    return is_over;
+}
+
 /// Positive form: what is no number is refused too.
-static bool in_range(const ivl_sim_spec_t *spec)
+bool ivl_sim_spec_good(const ivl_sim_spec_t *spec)
 {
 #define WITHIN(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                                           \
     &&(double)spec->name[0] >= (double)(lo) && (double)spec->name[0] <= (double)(hi)
@@ -231,13 +246,13 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
     group->active[lane] = false;
     while (!group->active[lane] && source(context, job))
     {
-        clear(job->outcome);
-        if (!in_range(job->spec))
+        ivl_sim_outcome_clear(job->outcome);
+        if (!ivl_sim_spec_good(job->spec))
         {
             job->outcome->end_reason[0] = IVL_SIM_END_REFUSED;
             job->outcome->t_end_s[0] = 0.0;
         }
-        else if (start(group, lane, job->spec))
+        else if (ivl_sim_rollout_start(group, lane, job->spec))
         {
             trace(job->tracer, group, lane);
             tick(group, lane, job->outcome);
@@ -253,11 +268,9 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
 /// What happens between two ticks.
 static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
 {
-    ivl_sim_end_t end;
     trace(job->tracer, group, lane);
-    if (ended(group, lane, job->outcome, &end))
+    if (ivl_sim_rollout_ended(group, lane, job->outcome))
     {
-        note_end(&group->world[lane], end, job->outcome);
         refill(group, lane, source, context, job);
     }
     else

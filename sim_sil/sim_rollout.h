@@ -119,6 +119,24 @@ typedef bool (*ivl_sim_source_t)(void *context, ivl_sim_job_t *job);
 /// Flies all landings of a source, several at a time.  Each outcome depends on its spec alone.
 void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
 
+// The parts of ivl_sim_fly, for a world that goes on before and after its landings.
+
+/// True if every field is within its range.
+bool ivl_sim_spec_good(const ivl_sim_spec_t *spec);
+
+/// Puts a vehicle to the start of a landing, whose fields are within their ranges.  The first tick is then due.
+/// @return false if the flight core refuses the policy
+bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec);
+
+/// Nothing has happened yet: counts 0, numbers that have no value NaN.
+void ivl_sim_outcome_clear(ivl_sim_outcome_t *outcome);
+
+/// After each tick: takes note of the trigger.
+void ivl_sim_rollout_note(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *outcome);
+
+/// Between two ticks: true if the landing is over, and then the outcome is complete.
+bool ivl_sim_rollout_ended(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *outcome);
+
 /// Lower-case name of an end, "?" for a number that is none.
 const char *ivl_sim_end_name(int end);
 

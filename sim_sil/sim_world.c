@@ -15,8 +15,7 @@ static const double TURNS_MAX = 16.0;  // what the limit on a step's turn can sh
 
 // ---- starting -----------------------------------------------------------------------------------------------------------
 
-/// Legs at rest on a body that moves without turning.
-static void place_feet(const ivl_sim_model_t *model, ivl_sim_kin_t *kin)
+void ivl_sim_world_rest_legs(const ivl_sim_model_t *model, ivl_sim_kin_t *kin)
 {
     const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
     for (int i = 0; i < IVL_SIM_LEGS; i++)
@@ -50,7 +49,7 @@ void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group)
     ivl_sim_kin_t resting;
     memset(&resting, 0, sizeof resting);
     resting.q_WB[3] = 1.0;
-    place_feet(model, &resting);
+    ivl_sim_world_rest_legs(model, &resting);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
         // an empty lane is computed along with the others: it must hold numbers
@@ -83,7 +82,7 @@ void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *
     memcpy(kin.p_WB_m, p_W_m, sizeof kin.p_WB_m);
     memcpy(kin.v_WB_mps, v_W_mps, sizeof kin.v_WB_mps);
     kin.q_WB[3] = 1.0;
-    place_feet(model, &kin);
+    ivl_sim_world_rest_legs(model, &kin);
     // all but the sensors, whose queue is large and needs no clearing
     memset(w, 0, offsetof(ivl_sim_world_t, sensors));
     memset(&w->firmware, 0, sizeof *w - offsetof(ivl_sim_world_t, firmware));
@@ -97,6 +96,31 @@ void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *
     model->core.init(group->port, lane, &model->firmware, &w->firmware);
     ivl_sim_world_place(group, lane, &kin);
     group->active[lane] = true;
+}
+
+void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t   *w = &group->world[lane];
+    ivl_sim_sensors_t *s = &w->sensors;
+    const double       past_s = w->t_s;
+    s->next_s -= past_s;
+    s->held.t_s -= past_s;
+    for (int i = 0; i < IVL_SIM_POSE_QUEUE; i++)
+    {
+        s->queue[i].t_s -= past_s;
+    }
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        w->t_touch_s[i] -= past_s;
+        w->stuck_order[i] = 0;
+    }
+    w->t_s = 0.0;
+    w->n_tick = 1;
+    w->n_step = 0;
+    w->n_order = 0;
+    w->impact = (ivl_sim_impact_t){.happened = false};
+    memset(w->plate_touched, 0, sizeof w->plate_touched);
+    w->d_min_m = w->model->raw.world_ceiling_height_m - group->state.p_WB_m.z[lane];
 }
 
 // ---- events -------------------------------------------------------------------------------------------------------------

@@ -82,6 +82,12 @@ void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *
 /// Replaces the state of motion, for tests; the feet hold on as before.
 void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *kin);
 
+/// Legs at rest on a body that moves without turning: fills in the feet of `kin`.
+void ivl_sim_world_rest_legs(const ivl_sim_model_t *model, ivl_sim_kin_t *kin);
+
+/// Within a tick: this tick becomes the first one, at time 0, of a vehicle that has touched nothing yet.  Motion and sensors go on.
+void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane);
+
 /// State of motion of one vehicle.
 ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane);
 
