@@ -131,6 +131,15 @@ def default_folder(chosen: Experiment, n_trials: int | None, resume: bool) -> Pa
         StoreError: Nothing is there to resume.
     """
     base = f"{chosen.name}-{chosen.learner.name}-seed{chosen.seed}" + (f"-x{n_trials}" if n_trials else "")
+    return numbered_folder(base, resume)
+
+
+def numbered_folder(base: str, resume: bool) -> Path:
+    """`runs/base`, `runs/base-2` ...: the first that is free; with `resume` the last that is there.
+
+    Raises:
+        StoreError: Nothing is there to resume.
+    """
     number, existing = 1, None
     while (candidate := Path("runs") / (base if number == 1 else f"{base}-{number}")).exists():
         existing, number = candidate, number + 1
@@ -156,7 +165,7 @@ def make_manifest(
         "model_sha256": world.params.digest(),
         "library_sha256": library.digest(),
         "ivl_version": ivl.__version__,
-        "git_commit": _git_commit(),
+        "git_commit": git_commit(),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "platform": platform.platform(),
@@ -231,7 +240,7 @@ def _json_number(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def _git_commit() -> str | None:
+def git_commit() -> str | None:
     """Commit of the source tree this package runs from; None outside of one."""
     command = ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"]
     try:

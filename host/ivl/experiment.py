@@ -26,11 +26,13 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Bounds = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
+    """Base of what is read from YAML: no conversion, no unknown key, no change afterwards."""
+
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
-class Setting(_Strict):
+class Setting(Strict):
     """A world parameter that this experiment changes."""
 
     value: float
@@ -38,7 +40,7 @@ class Setting(_Strict):
     source: str = Field(min_length=1)
 
 
-class PolicyParameter(_Strict):
+class PolicyParameter(Strict):
     """Where the search for one policy parameter starts, and its bounds."""
 
     mu0: Finite
@@ -46,21 +48,21 @@ class PolicyParameter(_Strict):
     bounds: Bounds
 
 
-class Policy(_Strict):
+class Policy(Strict):
     """The learned parameters: trigger threshold RREV_c (1/s) and moment M_yd (N mm)."""
 
     rrev_c_per_s: PolicyParameter
     moment_y_Nmm: PolicyParameter
 
 
-class LearnerChoice(_Strict):
+class LearnerChoice(Strict):
     """A learner by name, with options that differ from its defaults."""
 
     name: str
     options: dict[str, Any] = Field(default_factory=dict)
 
 
-class RewardChoice(_Strict):
+class RewardChoice(Strict):
     """A reward by name, with its constants."""
 
     name: str = "paper"
@@ -73,7 +75,7 @@ class RewardChoice(_Strict):
         return self
 
 
-class GridAxis(_Strict):
+class GridAxis(Strict):
     """One axis of the grid on which the best possible policy is looked for."""
 
     lo: Finite
@@ -87,7 +89,7 @@ class GridAxis(_Strict):
         return self
 
 
-class Check(_Strict):
+class Check(Strict):
     """How "solved" is judged: see `ivl.assess`."""
 
     n_fresh: int = Field(default=200, ge=1, le=100_000, description="rollouts that judge one recommended policy")
@@ -97,7 +99,7 @@ class Check(_Strict):
     moment_y_Nmm: GridAxis = GridAxis(lo=1.0, hi=11.0, step=0.5)
 
 
-class Experiment(_Strict):
+class Experiment(Strict):
     """A complete, checked experiment; `to_yaml` gives the text from which the same object is read."""
 
     name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$")
@@ -167,7 +169,7 @@ def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experi
     Raises:
         ConfigError: One line naming file, field and value.
     """
-    file = _locate(path)
+    file = locate(path, list_experiments())
     data = yamlfile.read(file)
     if not isinstance(data, dict):
         raise ConfigError(f"{file.name}: expected a mapping of fields, got {type(data).__name__}")
@@ -175,14 +177,14 @@ def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experi
         if value is not None:
             data[name] = {"name": value} if name == "learner" else value
     for setting in settings:
-        _apply(data, setting)
+        apply_setting(data, setting)
     return from_data(data, file.name)
 
 
 def from_data(data: Any, label: str) -> Experiment:
     """Check plain data; `label` names it in errors."""
     experiment = yamlfile.validate(Experiment, data, label)
-    _check_overrides(experiment.overrides, label)
+    check_overrides(experiment.overrides, label)
     try:
         experiment.make_learner(seed=0)
     except LearnerError as error:
@@ -198,17 +200,16 @@ def parse_setting(setting: str) -> tuple[str, Any]:
     return name.strip(), yamlfile.parse(text, f"--set {setting}")
 
 
-def _locate(path: str) -> Path:
+def locate(path: str, shipped: Sequence[str]) -> Path:
+    """A file as given, else inside this package; `shipped` are the names that an error offers."""
     for candidate in (Path(path), PACKAGE_DIR / path):
         if candidate.is_file():
             return candidate
-    raise ConfigError(
-        f"{path}: no such file, neither here nor in the package (shipped: {', '.join(list_experiments())})"
-    )
+    raise ConfigError(f"{path}: no such file, neither here nor in the package (shipped: {', '.join(shipped)})")
 
 
-def _apply(data: dict[str, Any], setting: str) -> None:
-    """Write one setting into the raw data of an experiment."""
+def apply_setting(data: dict[str, Any], setting: str) -> None:
+    """Write one setting into the raw data of an experiment or a sweep."""
     name, value = parse_setting(setting)
     table = native.library().params
     if name in table:
@@ -225,7 +226,8 @@ def _apply(data: dict[str, Any], setting: str) -> None:
     target[last] = value
 
 
-def _check_overrides(overrides: Mapping[str, Setting], label: str) -> None:
+def check_overrides(overrides: Mapping[str, Setting], label: str) -> None:
+    """Check names, values and units of overrides; `label` names their file in errors."""
     for name, setting in overrides.items():
         try:
             model.check_override(name, setting.value)

@@ -124,7 +124,7 @@ class RunStore:
         """
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            lock = _lock(folder)
+            lock = lock_folder(folder)
             try:
                 _clear_unfinished(folder)
             except BaseException:
@@ -133,7 +133,7 @@ class RunStore:
             store = cls(folder, outcome_dtype, lock)
             with store._transaction():
                 store._create_tables()
-            _write_durably(folder / "config.yaml", config_yaml)
+            write_durably(folder / "config.yaml", config_yaml.encode())
             write_json(folder / "manifest.json", manifest)
         except OSError as error:
             raise StoreError(f"{folder}: cannot be written: {error}") from error
@@ -150,7 +150,7 @@ class RunStore:
         if manifest.get("schema_version") != SCHEMA_VERSION:
             version = manifest.get("schema_version")
             raise StoreError(f"{folder}: schema version {version!r}, this program reads {SCHEMA_VERSION}")
-        store = cls(folder, outcome_dtype, _lock(folder))
+        store = cls(folder, outcome_dtype, lock_folder(folder))
         known = [row[1] for row in store._db.execute("PRAGMA table_info(rollout)")]
         if not known or [c for c in known if c.startswith("out_")] != list(store._outcome_columns):
             store.close()
@@ -343,7 +343,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 def write_json(path: Path, data: Any) -> None:
     """Write JSON so that the file is there whole or not at all."""
-    _write_durably(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
+    write_durably(path, (json.dumps(data, indent=2, allow_nan=False) + "\n").encode())
 
 
 def _outcome_columns(dtype: np.dtype[np.void]) -> dict[str, str]:
@@ -383,7 +383,7 @@ def _episode_row(row: tuple[Any, ...]) -> EpisodeRow:
     )
 
 
-def _lock(folder: Path) -> int:
+def lock_folder(folder: Path) -> int:
     """Keep other processes out; the kernel releases the lock whatever ends this one."""
     descriptor = os.open(folder / "lock", os.O_RDWR | os.O_CREAT, 0o644)
     try:
@@ -414,10 +414,11 @@ def _clear_unfinished(folder: Path) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def _write_durably(path: Path, text: str) -> None:
+def write_durably(path: Path, content: bytes) -> None:
+    """Write a file so that it is there whole or not at all, and on the disk when this returns."""
     part = path.with_name(path.name + ".part")
-    with part.open("w", encoding="utf-8") as file:
-        file.write(text)
+    with part.open("wb") as file:
+        file.write(content)
         file.flush()
         os.fsync(file.fileno())
     part.replace(path)

@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from ivl.cli import bench, can_gateway, console, flash, learn, listing, rollout
+from ivl.cli import bench, can_gateway, console, flash, learn, listing, rollout, sweep
 from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
 
 app = typer.Typer(
@@ -23,6 +23,8 @@ app.command("list", help=listing.HELP)(listing.list_)
 app.command("bench", help=bench.HELP)(bench.bench)
 app.command("flash", help=flash.HELP)(flash.flash)
 app.command("can-gateway", help=can_gateway.HELP)(can_gateway.can_gateway)
+app.command("sweep", help=sweep.HELP)(sweep.sweep)
+app.command("map", help=sweep.MAP_HELP)(sweep.map_)
 
 
 def run(arguments: list[str] | None = None) -> int:

@@ -112,6 +112,7 @@ def _rates(doc: str) -> list[pa.Field]:
 def _trials() -> Iterable[pa.Field]:
     recent = "over the last three episodes"
     yield from _trial_key()
+    yield field("run_seed", _I8, "1", "seed of the trial: `ivl learn --seed` with it repeats the trial")
     yield field(
         "seed",
         _I8,
@@ -182,7 +183,8 @@ def _map() -> Iterable[pa.Field]:
     yield field("vz_mps", _F8, "m/s", "velocity towards the ceiling at the start of the flip, V sin phi")
     yield field("rrev_per_s", _F8, "1/s", "RREV there: vz / d")
     yield field("of_y_radps", _F8, "rad/s", "OF_y there: -vx / d")
-    yield field("seed", _I8, "1", "seed of the world's random numbers; rollout k of the point has stream k")
+    yield field("seed", _I8, "1", "seed of the world's random numbers; the same at all points of a cell")
+    yield field("first_stream", _I8, "1", "rollout k of the point has the number first_stream + k within the seed")
     yield field("n", _I4, "1", "rollouts flown and brought to an end")
     yield field("n_four_leg", _I4, "1", "rollouts with three or four feet stuck")
     yield field("n_clean", _I4, "1", "the same without contact of body or rotor")

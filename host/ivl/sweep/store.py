@@ -6,7 +6,6 @@ what is done can be read while the rest is still flown.
 """
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import xarray as xr
 
 from ivl.errors import StoreError
+from ivl.store import write_durably
 from ivl.sweep import schema
 from ivl.sweep.schema import CELL, KINDS, SCHEMA_VERSION, TASKS, TRIAL_KEY, VERSION_KEY
 
@@ -43,8 +43,8 @@ def read_manifest(run: Path | str) -> dict[str, Any]:
         manifest = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise StoreError(f"{path}: cannot be read: {error}") from error
-    if not isinstance(manifest, dict) or "sweep" not in manifest:
-        raise StoreError(f"{path}: is not the manifest of a sweep")
+    if not isinstance(manifest, dict) or not {"sweep", "map"} & set(manifest):
+        raise StoreError(f"{path}: is not the manifest of a sweep or map")
     if manifest.get("schema_version") != SCHEMA_VERSION:
         version = manifest.get("schema_version")
         raise StoreError(f"{path}: schema_version {version!r}, this program reads {SCHEMA_VERSION}")
@@ -63,8 +63,9 @@ def read_table(run: Path | str, kind: str) -> pa.Table:
     parts = [_read_part(path, wanted) for path in sorted((Path(run) / kind).glob("*.parquet"))]
     if not parts:
         return wanted.empty_table()
-    table = pa.concat_tables(parts).unify_dictionaries()
-    return table.sort_by([(name, "ascending") for name in _SORT[kind]])
+    plain = pa.schema([f.with_type(pa.string()) if pa.types.is_dictionary(f.type) else f for f in wanted])
+    table = pa.concat_tables([part.cast(plain) for part in parts])  # Arrow does not sort dictionaries
+    return table.sort_by([(name, "ascending") for name in _SORT[kind]]).combine_chunks().cast(wanted)
 
 
 def read_frame(run: Path | str, kind: str) -> pd.DataFrame:
@@ -98,7 +99,7 @@ def to_xarray(run: Path | str, kind: str = schema.TRIALS) -> xr.Dataset:
     """A run as a labelled array: dimensions are the key of the table, variables have `units` and `long_name`.
 
     Vehicle, gear set and learner become dimensions only if the run has more than one of them, else attributes. Cells
-    that are missing are NaN.
+    that are missing are NaN, which makes floats of whole numbers: seeds for a replay come from `read_trials`.
     """
     frame, columns = read_frame(run, kind), schema.schema(kind)
     key = [name for name in _SORT[kind] if name in frame]
@@ -130,19 +131,19 @@ def _read_part(path: Path, wanted: pa.Schema) -> pa.Table:
     return table
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all, and on the disk when this returns."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    with temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
-
-
 def finished_tasks(run: Path) -> set[int]:
-    """Numbers of the tasks whose results are in the run folder."""
-    return {int(path.stem) for path in (run / TASKS).glob("*.parquet")}
+    """Numbers of the tasks whose results are in the run folder, those with failures not counted."""
+    done, failed = ({int(path.stem) for path in (run / kind).glob("*.parquet")} for kind in (TASKS, schema.FAILURES))
+    return done - failed
+
+
+def clear_unfinished(run: Path) -> None:
+    """Remove parts of tasks that were cut off or had failures, so that they can be flown again."""
+    keep = finished_tasks(run)
+    for kind in (TASKS, *(k for k in KINDS if k != TASKS)):  # the record first, so that a cut in here is harmless
+        for path in (run / kind).glob("*.parquet*"):
+            if path.suffix != ".parquet" or int(path.stem) not in keep:
+                path.unlink()
 
 
 def write_part(run: Path, task: int, parts: Mapping[str, bytes]) -> None:
@@ -150,4 +151,4 @@ def write_part(run: Path, task: int, parts: Mapping[str, bytes]) -> None:
     for kind in (*(k for k in parts if k != TASKS), TASKS):
         folder = run / kind
         folder.mkdir(parents=True, exist_ok=True)
-        write_atomically(folder / f"{task:06d}.parquet", parts[kind])
+        write_durably(folder / f"{task:06d}.parquet", parts[kind])

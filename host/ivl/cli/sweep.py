@@ -1,0 +1,183 @@
+"""`ivl sweep` and `ivl map`."""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn
+
+from ivl import campaign
+from ivl.cli import console
+
+HELP = """Learn over a grid of approaches and landing gears: run a sweep FILE.
+
+FILE is YAML; a name such as sweeps/paper.yaml is also found inside the package. Tables land in a run folder, in
+Parquet, one row per trial (see ivl.sweep.schema); results do not depend on workers, their number, or interruptions.
+
+\b
+Examples:
+  ivl sweep sweeps/smoke.yaml
+      a few cells, in seconds
+  ivl sweep sweeps/paper.yaml --learner ephe
+      the paper's campaign with another learner, on all processors of this machine
+  ivl sweep sweeps/paper.yaml --set gear_set=table1 --set trials=1
+      other landing gears, one trial per cell
+  ivl sweep sweeps/paper.yaml --out runs/mine --resume
+      go on after Ctrl-C, kill -9 or power loss; trials that failed are flown again
+  ivl sweep sweeps/paper.yaml --scheduler tcp://10.0.0.1:8786
+      on a Dask cluster that is running
+  ivl sweep sweeps/paper.yaml --scheduler slurm --workers 100
+      on a batch system (describe its jobs in Dask's configuration, see docs/SCALING.md)
+"""
+
+MAP_HELP = """Fly the policy map: flips commanded at once over a grid of speed, angle, distance and moment.
+
+FILE is YAML; a name such as sweeps/map.yaml is also found inside the package. Nothing is learned: the map shows from
+where a landing is possible at all. Options are those of `ivl sweep`.
+
+\b
+Examples:
+  ivl map sweeps/map.yaml
+      the map of the paper's landing gears
+  ivl map sweeps/map.yaml --set gears=[wide_long] --json
+      one of them, for a script
+"""
+
+File = Annotated[str, typer.Argument(metavar="FILE", help="YAML file.")]
+Out = Annotated[Path | None, typer.Option(help="Run folder; default: a new one under runs/.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue a run that was cut off, or had failures.")]
+Scheduler = Annotated[
+    str | None, typer.Option(help="Address of a Dask scheduler, or slurm; default: processes on this machine.")
+]
+Workers = Annotated[int | None, typer.Option(help="Worker processes; default: one per processor.", min=1, max=100_000)]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="A.B=C", help="Change a field of the file or a parameter of the world."),
+]
+TaskSize = Annotated[int | None, typer.Option(help="Trials per task; default: as fits the workers.", min=1, max=10_000)]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be flown, and stop.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")]
+
+
+def sweep(
+    path: File,
+    out: Out = None,
+    resume: Resume = False,
+    scheduler: Scheduler = None,
+    workers: Workers = None,
+    learner: Annotated[str | None, typer.Option(help="Learner by name; see `ivl list learners`.")] = None,
+    settings: Settings = None,
+    task_size: TaskSize = None,
+    dry_run: DryRun = False,
+    as_json: AsJson = False,
+) -> int:
+    """Run a sweep; HELP is the text that people see."""
+    from ivl.sweep import config  # with Arrow and Dask it takes a second to load
+
+    grid = config.load_sweep(path, settings or [], learner=learner)
+    base = f"{grid.name}-{grid.gear_set}-{grid.learner.name}"
+    return _run(grid, base, "ivl sweep", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
+
+
+def map_(
+    path: File,
+    out: Out = None,
+    resume: Resume = False,
+    scheduler: Scheduler = None,
+    workers: Workers = None,
+    settings: Settings = None,
+    task_size: TaskSize = None,
+    dry_run: DryRun = False,
+    as_json: AsJson = False,
+) -> int:
+    """Fly a policy map; MAP_HELP is the text that people see."""
+    from ivl.sweep import config
+
+    grid = config.load_map(path, settings or [])
+    base = f"{grid.name}-{grid.gear_set}"
+    return _run(grid, base, "ivl map", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
+
+
+def _run(
+    grid: Any, base: str, command: str, path: str, out: Path | None, resume: bool, scheduler: str | None,
+    workers: int | None, task_size: int | None, dry_run: bool, as_json: bool,
+) -> int:  # fmt: skip
+    """What both commands do; exit code 1 if trials failed."""
+    from ivl.sweep import cluster, engine, plan, summary
+
+    if dry_run:
+        size = task_size or plan.good_size(grid, workers or cluster.processors())
+        _print(summary.of_plan(grid, size), as_json)
+        return 0
+    run_folder = out or campaign.numbered_folder(base, resume)
+    console.err.print(f"run folder: {run_folder}", highlight=False, soft_wrap=True)
+    try:
+        with _progress() as on_standing:
+            result = engine.run(
+                grid, run_folder, resume=resume, scheduler=scheduler, workers=workers, task_size=task_size,
+                on_standing=on_standing,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        console.err.print(
+            f"interrupted; continue with the same options and --resume --out {run_folder} ({command} {path})",
+            highlight=False,
+            soft_wrap=True,
+        )
+        raise
+    report = summary.of_run(result)
+    _print(report, as_json)
+    return 1 if report["failed"] else 0
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[Any], None]]:
+    """A bar on stderr, and the function that moves it."""
+    columns = (
+        BarColumn(),
+        TaskProgressColumn(),
+        MofNCompleteColumn(),
+        TextColumn("trials,"),
+        TextColumn("{task.fields[rate]}"),
+        TextColumn("{task.fields[left]}"),
+    )
+    with Progress(*columns, console=console.err) as bar:
+        row = bar.add_task("", total=None, rate="starting workers", left="")
+
+        def move(standing: Any) -> None:
+            bar.update(
+                row, total=standing.n_trials, completed=standing.n_done, rate=_rate(standing), left=_left(standing)
+            )
+
+        yield move
+
+
+def _rate(standing: Any) -> str:
+    failed = f", {standing.n_failed} failed" if standing.n_failed else ""
+    if not standing.n_workers:
+        return "starting workers" if standing.n_done < standing.n_trials else ""
+    speed = standing.n_rollouts / standing.elapsed_s if standing.elapsed_s > 0 else 0.0
+    return f"{speed:.0f} rollouts/s on {standing.n_workers} workers{failed}"
+
+
+def _left(standing: Any) -> str:
+    if standing.n_done == standing.n_trials:
+        return f"took {_clock(standing.elapsed_s)}"
+    return "" if math.isnan(standing.left_s) else f"{_clock(standing.left_s)} to go"
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}"
+
+
+def _print(report: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        console.print_json(report)
+        return
+    for name, value in report.items():
+        text = ", ".join(map(str, value)) if isinstance(value, list) else value
+        console.out.print(f"{name.replace('_', ' '):32s} {text}", highlight=False, soft_wrap=True)

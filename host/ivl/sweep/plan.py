@@ -1,0 +1,55 @@
+"""Tasks: which trials are flown together.
+
+Trials differ in cost up to sevenfold (a slow, flat approach presses its plates along the ceiling for a second), so they
+are dealt to the tasks in a fixed shuffled order: tasks cost about the same, and what is done tells how long the rest
+takes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ivl.sweep.config import PolicyMap, Sweep
+from ivl.sweep.trials import Trial
+
+TASKS_PER_WORKER = 8  # at least so many if there are trials enough, so that the last ones end together
+SIZE_MIN, SIZE_MAX = 4, 32
+"""Trials of a task: fewer do not fill a native batch, more only make a lost worker cost more."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """Some trials (or map cells) of one landing gear.
+
+    Attributes:
+        number: Number of the task in its run; names its files.
+        gear: Landing gear.
+        trials: The trials; of a map the cells, as trial 0.
+    """
+
+    number: int
+    gear: str
+    trials: tuple[Trial, ...]
+
+
+def plan(grid: Sweep | PolicyMap, size: int) -> list[Task]:
+    """All tasks, `size` trials each but for the last of a landing gear; the same for the same arguments, always."""
+    n_trials = grid.trials if isinstance(grid, Sweep) else 1
+    names = [Trial(speed, angle, k) for speed, angle in grid.approaches() for k in range(n_trials)]
+    shuffled = [names[i] for i in np.random.Generator(np.random.PCG64(0)).permutation(len(names))]
+    tasks: list[Task] = []
+    for gear in grid.gear_names():
+        for part in _chunks(shuffled, size):
+            tasks.append(Task(len(tasks), gear, tuple(part)))
+    return tasks
+
+
+def good_size(grid: Sweep | PolicyMap, n_workers: int) -> int:
+    """Trials per task that keep `n_workers` busy to the end without tasks that are too small."""
+    n_trials = len(grid.approaches()) * len(grid.gear_names()) * (grid.trials if isinstance(grid, Sweep) else 1)
+    return int(np.clip(n_trials // (TASKS_PER_WORKER * max(n_workers, 1)), SIZE_MIN, SIZE_MAX))
+
+
+def _chunks(items: Sequence[Trial], size: int) -> list[Sequence[Trial]]:
+    return [items[first : first + size] for first in range(0, len(items), size)]

@@ -1,0 +1,132 @@
+"""What a worker does with a task: fly it, make tables of it, send them back as Parquet files.
+
+A worker needs this package and the native library, and nothing of the client's files: the world comes with the task.
+"""
+
+import os
+import platform
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import pyarrow as pa  # type: ignore[import-untyped]
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from ivl import native
+from ivl.errors import NativeError
+from ivl.sweep import policymap, schema, tables, trials
+from ivl.sweep.config import PolicyMap, Sweep
+from ivl.sweep.plan import Task
+from ivl.sweep.trials import Trial
+from ivl.world import World
+
+Tables = dict[str, pa.Table]
+
+
+@dataclass(frozen=True)
+class Done:
+    """A finished task.
+
+    Attributes:
+        parts: Parquet file of each kind of table.
+        n_trials: Trials (or map cells) that were finished.
+        n_failed: Trials that were not.
+        n_rollouts: Rollouts flown.
+        processor_s: Processor time.
+        wall_s: Wall time.
+        worker: Host and process.
+    """
+
+    parts: dict[str, bytes]
+    n_trials: int
+    n_failed: int
+    n_rollouts: int
+    processor_s: float
+    wall_s: float
+    worker: str
+
+
+def run_task(grid: Sweep | PolicyMap, world: World, task: Task, library_sha256: str) -> Done:
+    """Fly a task on one thread; trials that raise are reported in `failures`, the others are not touched by it.
+
+    Raises:
+        NativeError: This worker has another native library than the client, so that its bits would differ.
+    """
+    if _library_sha256() != library_sha256:
+        raise NativeError(f"{native.library().path}: this worker's native library is not that of the client")
+    began, processor = time.monotonic(), time.process_time()
+    with threadpool_limits(1):  # the number of BLAS threads changes the last bits of a search
+        flown, failed = _fly_all_or_each(grid, world, task.trials)
+        found = [one for one, _ in flown]
+        merged = {kind: pa.concat_tables([one[kind] for one in found]) for kind in (found[0] if found else ())}
+        if failed:
+            merged[schema.FAILURES] = tables.failures_table(grid, task.gear, task.number, failed)
+        parts = {kind: tables.encode(table) for kind, table in merged.items()}
+    return Done(
+        parts=parts,
+        n_trials=len(task.trials) - len(failed),
+        n_failed=len(failed),
+        n_rollouts=sum(n for _, n in flown),
+        processor_s=time.process_time() - processor,
+        wall_s=time.monotonic() - began,
+        worker=f"{platform.node()}:{os.getpid()}",
+    )
+
+
+def lost(grid: Sweep | PolicyMap, task: Task, error: Exception) -> Done:
+    """A task that no worker could finish: all its trials failed."""
+    failed = [(trial, error) for trial in task.trials]
+    parts = {schema.FAILURES: tables.encode(tables.failures_table(grid, task.gear, task.number, failed))}
+    return Done(parts, 0, len(failed), 0, 0.0, 0.0, "")
+
+
+def record(task: Task, done: Done) -> bytes:
+    """The row of the `tasks` table, as a Parquet file."""
+    columns = {
+        "task": [task.number],
+        "n_trials": [done.n_trials],
+        "n_failed": [done.n_failed],
+        "n_rollouts": [done.n_rollouts],
+        "processor_s": [done.processor_s],
+        "wall_s": [done.wall_s],
+        "result_bytes": [sum(len(part) for part in done.parts.values())],
+        "worker": [done.worker],
+    }
+    return tables.encode(tables.make_table(schema.TASKS, columns))
+
+
+def _fly_all_or_each(
+    grid: Sweep | PolicyMap, world: World, names: Sequence[Trial]
+) -> tuple[list[tuple[Tables, int]], list[tuple[Trial, Exception]]]:
+    """Everything in one go; if that raises, one after the other, so that only those fail that must."""
+    try:
+        return [_fly(grid, world, names)], []
+    except Exception:  # noqa: BLE001 - whoever raises it again below is reported
+        flown, failed = [], []
+        for name in names:
+            try:
+                flown.append(_fly(grid, world, [name]))
+            except Exception as error:  # noqa: BLE001 - a cell fails alone, whatever it raises, and is reported
+                failed.append((name, error))
+        return flown, failed
+
+
+def _fly(grid: Sweep | PolicyMap, world: World, names: Sequence[Trial]) -> tuple[Tables, int]:
+    """Tables of some trials or map cells, and how many rollouts they took."""
+    if isinstance(grid, PolicyMap):
+        table = policymap.fly(grid, world, names)
+        return {schema.MAP: table}, table.num_rows * grid.n_rollouts
+    log = trials.run(grid, world, names)
+    made = {
+        schema.TRIALS: tables.trials_table(grid, world.gear, log),
+        schema.EPISODES: tables.episodes_table(grid, world.gear, log),
+    }
+    if grid.keep_rollouts:
+        made[schema.ROLLOUTS] = tables.rollouts_table(grid, world.gear, log)
+    return made, log.n_rollouts
+
+
+@cache
+def _library_sha256() -> str:
+    return native.library().digest()
