@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from ivl.cli import bench, can_gateway, console, flash, learn, listing, rollout, sweep
+from ivl.cli import bench, can_gateway, console, export, flash, learn, listing, report, rollout, sweep
 from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
 
 app = typer.Typer(
@@ -25,6 +25,8 @@ app.command("flash", help=flash.HELP)(flash.flash)
 app.command("can-gateway", help=can_gateway.HELP)(can_gateway.can_gateway)
 app.command("sweep", help=sweep.HELP)(sweep.sweep)
 app.command("map", help=sweep.MAP_HELP)(sweep.map_)
+app.command("report", help=report.HELP)(report.report)
+app.command("export", help=export.HELP)(export.export)
 
 
 def run(arguments: list[str] | None = None) -> int:

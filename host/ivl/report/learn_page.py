@@ -1,4 +1,4 @@
-"""What the page of an `ivl learn` run shows: convergence, every rollout of the first trial to replay, best and worst."""
+"""What the page of an `ivl learn` run shows: convergence, and every rollout of the first trial to replay."""
 
 import json
 from collections.abc import Callable

@@ -30,7 +30,10 @@ def render(data: Mapping[str, Any]) -> str:
         data: Plain data; what the scripts read of it is what `learn_page` and `sweep_page` write.
     """
     panes = "".join(_read("pane.html").replace("{{name}}", n).replace("{{NAME}}", n.upper()) for n in "ab")
-    footer = f"Made by ivl {ivl.__version__} from the run's own files; landings flown again by its simulator. Figures: plotly.js (MIT)."
+    footer = (
+        f"Made by ivl {ivl.__version__} from the run's own files; landings flown again by its simulator. "
+        "Figures: plotly.js (MIT)."
+    )
     parts = {
         "style": _read("page.css"),
         "panes": panes,

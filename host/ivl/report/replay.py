@@ -18,7 +18,7 @@ from ivl.reward import RewardOptions, paper
 from ivl.world import Trace, World
 
 SCALE = {"t": 1e-4, "p": 1e-4, "q": 1e-4, "f": 1e-4, "pitch": 0.1, "cues": (1e-4, 1e-3, 1e-2, 1e-2)}
-"""Unit of a stored number: s, m, 1, m, degrees; cues: s, m, 1/s, rad/s. The page gets this table along with the data."""
+"""Unit of a stored number: s, m, 1, m, degrees; cues: s, m, 1/s, rad/s. The page gets this table with the data."""
 TOLERANCE = {"p": 4e-4, "q": 2.5e-3, "f": 8e-4, "pitch": 0.5}
 """Largest error of interpolation, in the units of the trace: m, 1, m, degrees."""
 BEFORE_TRIGGER_S, AFTER_CONTACT_S = 0.30, 0.80
@@ -140,7 +140,7 @@ def _continuous(q: FloatArray) -> FloatArray:
 def _changes(column: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
     """True in the last row before a change and in the first one after it."""
     changed = np.any(np.diff(column.reshape(len(column), -1), axis=0) != 0, axis=1)
-    return np.append(changed, False) | np.append(False, changed)
+    return np.asarray(np.append(changed, False) | np.append(False, changed))
 
 
 def _nearest(t_s: FloatArray, result: Any) -> npt.NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""What the page of an `ivl sweep` run shows: landing rates of every cell, its trials and their search, best landings."""
+"""What the page of an `ivl sweep` run shows: landing rates of all cells, trials and their search, best landings."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,9 +22,7 @@ _PLACES = {"gear": "gears", "speed_mps": "speeds", "angle_deg": "angles"}
 _PARAMETERS = {"rrev": "rrev_c_per_s", "moment": "moment_y_Nmm"}
 
 
-def collect(
-    folder: Path, n_landings_max: int, on_landing: Callable[[int, int], None]
-) -> tuple[dict[str, Any], Album]:
+def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], None]) -> tuple[dict[str, Any], Album]:
     """Data of the page, and its landings (arguments as `learn_page.collect`).
 
     Raises:
@@ -63,7 +61,7 @@ def _tables(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _fly(
     sweep: Sweep, trials: pd.DataFrame, album: Album, n_max: int, on_landing: Callable[[int, int], None]
 ) -> pd.Series:
-    """Number of each trial's best landing on the page, -1 without: that of each cell first, others as far as there is room."""
+    """Number of each trial's best landing on the page, -1 without: first one a cell, others as far as there is room."""
     order = trials.sort_values(["cell", "best_reward", RATE], ascending=[True, False, False], kind="stable")
     flown = order[order["best_stream"] >= 0]
     firsts, others = flown.groupby("cell").head(1), flown[flown["cell"].duplicated()]
@@ -72,13 +70,18 @@ def _fly(
     numbers = pd.Series(-1, index=trials.index)
     for done, row in enumerate(sorted(chosen), 1):
         trial = trials.loc[row]
-        label = f"{trial['gear'].replace('_', ' ')}, {trial['speed_mps']:g} m/s at {trial['angle_deg']:g}°, trial {trial['trial']}"
-        numbers[row] = album.add(_spec(sweep, trial), label, _is_recorded(sweep, trial))
+        numbers[row] = album.add(best_landing(sweep, trial), label(trial), _is_recorded(sweep, trial))
         on_landing(done, len(chosen))
     return numbers
 
 
-def _spec(sweep: Sweep, trial: pd.Series) -> LandingSpec:
+def label(trial: pd.Series) -> str:
+    """What people call a trial."""
+    gear = trial["gear"].replace("_", " ")
+    return f"{gear}, {trial['speed_mps']:g} m/s at {trial['angle_deg']:g}°, trial {trial['trial']}"
+
+
+def best_landing(sweep: Sweep, trial: pd.Series) -> LandingSpec:
     """The rollout of a trial with the largest return."""
     return LandingSpec(
         vehicle=trial["vehicle"],

@@ -39,7 +39,7 @@ function drawCeiling(context, camera) {
   for (let k = -n; k <= n; k++) {
     for (const line of [[[k, -n], [k, n]], [[-n, k], [n, k]]]) {
       path(context, line.map(([i, j]) => camera.project([x0 + i * GRID_M, y0 + j * GRID_M, 0])));
-      context.strokeStyle = "rgba(150,162,175,0.45)";
+      context.strokeStyle = `rgba(150,162,175,${0.45 * Math.min(1, 0.2 / camera.half)})`;
       context.lineWidth = 0.7;
       context.stroke();
     }
@@ -161,7 +161,7 @@ function footShape(foot, k, geometry, camera) {
       context.lineWidth = 2;
       context.stroke();
     }
-    label(context, String(k + 1), x + radius + 5, y - radius - 2, foot.state === 2 ? "#00664b" : INK);
+    if (camera.half < 0.3) label(context, String(k + 1), x + radius + 5, y - radius - 2, foot.state === 2 ? "#00664b" : INK);
   } };
 }
 
