@@ -49,6 +49,12 @@ learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for ano
 	$(say) 'learn: $(EXPERIMENT)'
 	@$(BIN)/ivl learn $(EXPERIMENT)
 
+.PHONY: figs
+figs: setup build ## the paper's figures 4 to 9 from RUN=... (a sweep's run folder, or several)
+	$(say) 'figs: $(RUN)'
+	@test -n '$(RUN)' || { echo 'figs: say which run, for example: make figs RUN=runs/paper-as_simulated-bo'; exit 2; }
+	@$(BIN)/ivl figs $(RUN)
+
 ##@ The vehicle's processor
 
 .PHONY: firmware
@@ -101,7 +107,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 .PHONY: test
-test: lint test-c san golden test-py test-physics test-mujoco pil sizes-diff ## everything below, set-up and compilers included
+test: lint test-c san golden test-py test-wire test-physics test-mujoco pil sizes-diff ## everything below, set-up and compilers included
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
@@ -139,6 +145,11 @@ test-py: setup-dev build ## tests of the Python package
 	$(say) 'test-py: pytest tests/py'
 	@$(BIN)/python -m pytest tests/py $(PYTEST_ARGS)
 
+.PHONY: test-wire
+test-wire: setup-dev build ## CRTP over a CAN bus, and motion capture
+	$(say) 'test-wire: pytest tests/wire'
+	@$(BIN)/python -m pytest tests/wire $(PYTEST_ARGS)
+
 .PHONY: test-physics
 test-physics: setup-dev build ## landings with known properties, and a sample of the step-size study
 	$(say) 'test-physics: pytest tests/physics'
@@ -152,6 +163,11 @@ step-study: setup-dev build ## ten thousand landings with shorter and shorter st
 test-mujoco: setup-dev build ## landings compared with an independent engine
 	$(say) 'test-mujoco: pytest tests/mujoco'
 	@$(BIN)/python -m pytest tests/mujoco $(PYTEST_ARGS)
+
+.PHONY: test-analysis
+test-analysis: setup-dev build ## analysis and figures of campaigns, on tables with known answers
+	$(say) 'test-analysis: pytest tests/analysis'
+	@$(BIN)/python -m pytest tests/analysis $(PYTEST_ARGS)
 
 .PHONY: lint
 lint: setup-dev toolchain ## formatting, types, rules of the firmware core, equation references

@@ -35,11 +35,11 @@ class Vehicle(threading.Thread):
         self.armed = False
         self._client: tuple[str, int] | None = None
         self._t_log_s = 0.0
-        self._stop = threading.Event()
+        self._ended = threading.Event()
         self.start()
 
     def stop(self) -> None:
-        self._stop.set()
+        self._ended.set()
         self.join()
         self.socket.close()
 
@@ -52,7 +52,7 @@ class Vehicle(threading.Thread):
         return [p[1:] for p in list(self.received) if (p[0] >> 4, p[0] & 3) == (port, channel)]
 
     def run(self) -> None:
-        while not self._stop.is_set():
+        while not self._ended.is_set():
             try:
                 packet, address = self.socket.recvfrom(64)
             except (TimeoutError, ConnectionError):

@@ -85,6 +85,7 @@ class Gateway(asyncio.DatagramProtocol):
             self._close()
             with contextlib.suppress(BusError):
                 self._link.say(State.STOPPED, self.n_repeated, time.monotonic())
+            await asyncio.sleep(0)  # the socket closes in the next turn of the loop
 
     @property
     def n_repeated(self) -> int:

@@ -111,7 +111,7 @@ def _open_bus(
     given = {name: value for name, value in settings.items() if value is not None}
     try:
         return can.Bus(interface=interface, channel=channel, ignore_config=True, **given)
-    except (can.CanError, ValueError, TypeError, OSError) as error:
+    except (can.CanError, NotImplementedError, ValueError, TypeError, OSError) as error:
         raise LinkError(f"CAN interface {interface}, channel {channel}: {' '.join(str(error).split())}") from error
 
 
