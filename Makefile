@@ -107,7 +107,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 .PHONY: test
-test: lint test-c san golden test-py test-wire test-physics test-mujoco pil sizes-diff ## everything below, set-up and compilers included
+test: lint test-c san golden test-py test-wire test-physics test-mujoco test-analysis pil sizes-diff ## everything below, set-up and compilers included
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
@@ -224,7 +224,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/pil/*.[ch] tests/c/*.[ch] tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h tests/c/*.[ch] tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
 
 # set-up, each step once
 

@@ -1,6 +1,6 @@
 # Compiles firmware core, simulator and C tests.  Called by the Makefile as
 #     make -f tools/native.mk FLAVOUR=<flavour> <target>
-# Targets: core, lib, check.  Everything made is in build/<flavour>/.
+# Targets: core, lib, sil, check.  Everything made is in build/<flavour>/.
 # Each source is compiled once per flavour; the library and the tests link the same objects.
 
 FLAVOUR ?= release
@@ -47,26 +47,41 @@ VARIANTS :=
 FLAGS_sim_sil := -Wno-psabi
 FLAGS_sim_sil/pil := $(FLAGS_sim_sil) -Ifirmware/stm32f405
 
+# the software vehicle: the app's own sources, with the vehicle in the place of its SDK
+FLAGS_vehicle      := $(FLAGS_sim_sil) -DSDK_ON_HOST -Isim_sil/cf -Ifirmware/app -isystem sim_sil/cf/sdk -isystem firmware/sdk
+FLAGS_sim_sil/cf   := $(FLAGS_vehicle)
+FLAGS_firmware/app := $(FLAGS_vehicle)
+
 # Unity is a foreign source: a system header to the tests, compiled without our warnings
 UNITY         := build/unity
 FLAGS_unity   := -DUNITY_INCLUDE_DOUBLE -isystem $(UNITY)
-FLAGS_tests/c := $(FLAGS_unity) $(FLAGS_sim_sil) -Itests/c
+FLAGS_tests/c := $(FLAGS_unity) $(FLAGS_sim_sil) -Itests/c -Isim_sil/cf -Itests/crtp
+
+# the link server, and a vehicle that only writes down what it is told, for its tests
+FLAGS_sim_sil/crtp := $(FLAGS_sim_sil)
+FLAGS_tests/crtp   := $(FLAGS_sim_sil)
 
 BUILD   := build/$(FLAVOUR)
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
 SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/pil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
+CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out %/app_controller.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
 LIBRARY := host/ivl/_native/libivl_sil.so
+SERVER  := host/ivl/_native/ivl_sil
+CRTP    := $(patsubst %.c,$(BUILD)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
+FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core lib check FORCE
+.PHONY: core lib sil check FORCE
 
 core: $(CORE)
 
 # only the release flavour is installed where Python looks for it
 lib: $(if $(filter release,$(FLAVOUR)),$(LIBRARY),$(BUILD)/libivl_sil.so)
+
+sil: $(if $(filter release,$(FLAVOUR)),$(SERVER),$(BUILD)/ivl_sil)
 
 check: $(TESTS:%=run-%)
 	@test -n '$(TESTS)' || { echo 'error: no tests/c/test_*.c found' >&2; exit 1; }
@@ -81,7 +96,23 @@ $(BUILD)/libivl_sil.so: $(CORE) $(SIM) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -shared -Wl,-Bsymbolic -o $@ $(filter %.o,$^) $(LDLIBS)
 
+$(SERVER): $(BUILD)/ivl_sil
+	@mkdir -p $(@D)
+	@cp $< $@.new && mv -f $@.new $@
+
+$(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -o $@ $(filter %.o,$^) $(LDLIBS)
+
+$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(CORE) $(SIM) $(CRTP) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+
 $(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+
+$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(CORE) $(SIM) $(CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
 
@@ -105,7 +136,7 @@ $(foreach v,$(VARIANTS),$(eval $(BUILD)/sim_sil/$v.o: sim_sil/$(firstword $(subs
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
 ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(LTO_LINK_$(FLAVOUR)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
-ALL_OBJECTS := $(CORE) $(SIM) $(SUPPORT)
+ALL_OBJECTS := $(CORE) $(SIM) $(CF) $(CRTP) $(SUPPORT)
 
 define remember
 @mkdir -p $(@D)
@@ -118,4 +149,4 @@ $(BUILD)/flags.txt: FORCE
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))

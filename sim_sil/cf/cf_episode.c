@@ -1,0 +1,87 @@
+/// @file cf_episode.c
+/// Landings: each begins when the app accepts an approach, and is judged by the same functions as in the process of the host.
+#include <string.h>
+
+#include "app_convert.h"
+#include "cf_vehicle.h"
+
+/// The parameter, if it is what the command's float was made from; else the float.
+static double exact(double parameter, float from_parameter, float commanded)
+{
+    return (from_parameter >= commanded && from_parameter <= commanded) ? parameter : (double)commanded;
+}
+
+static ivl_sim_spec_t spec_of(const ivl_cf_settings_t *set)
+{
+    const ivl_command_t *cmd = &ivl_app.in.cmd;
+    const ivl_policy_t  *policy = &ivl_app.state.policy;
+    const float          angle_rad = (float)(set->angle_deg * (IVL_SIM_PI / 180.0));
+    return (ivl_sim_spec_t){
+        .speed_mps = {exact(set->speed_mps, (float)set->speed_mps, cmd->speed_mps)},
+        .angle_deg = {(angle_rad >= cmd->angle_rad && angle_rad <= cmd->angle_rad) ? set->angle_deg
+                                                                                   : (double)cmd->angle_rad * (180.0 / IVL_SIM_PI)},
+        .rrev_c_per_s = {(double)policy->rrev_c_per_s},
+        .moment_y_Nmm = {(double)policy->moment_y_Nm * 1.0e3},
+        .d_ceil_m = {set->d_ceil_m},
+        .seed = {(uint64_t)set->seed_hi << 32 | set->seed_lo},
+        .stream = {(uint64_t)set->stream_hi << 32 | set->stream_lo},
+        .start = {set->start},
+    };
+}
+
+static void end(ivl_cf_t *cf)
+{
+    ivl_cf_episode_t *e = &cf->episode;
+    e->running = false;
+    e->ended = 1;
+    e->header = (ivl_cf_outcome_header_t){IVL_CF_OUTCOME_MAGIC, e->number, (uint32_t)sizeof e->outcome, e->policy_seq};
+    e->outcome = e->now;
+}
+
+/// @return false if there is no such landing
+static bool put_to_start(ivl_cf_t *cf)
+{
+    const ivl_sim_spec_t spec = spec_of(&cf->set);
+    if (!ivl_sim_spec_good(&spec))
+    {
+        return false;
+    }
+    cf->grounded = false;
+    return ivl_sim_rollout_start(&cf->group, IVL_CF_LANE, &spec);
+}
+
+void ivl_cf_episode_begin(ivl_cf_t *cf)
+{
+    ivl_cf_episode_t *e = &cf->episode;
+    e->number++;
+    e->running = true;
+    e->ended = 0;
+    e->policy_seq = ivl_app.state.policy.seq;
+    ivl_sim_outcome_clear(&e->now);
+    if (cf->set.start == IVL_CF_START_AS_FLOWN)
+    {
+        ivl_sim_world_rebase(&cf->group, IVL_CF_LANE);
+        cf->zero_us = ivl_cf_time_us(cf);
+    }
+    else if (put_to_start(cf))
+    {
+        cf->zero_us = ivl_cf_time_us(cf);
+        ivl_sim_world_tick(&cf->group, IVL_CF_LANE);
+    }
+    else
+    {
+        e->now.end_reason[0] = IVL_SIM_END_REFUSED;
+        e->now.t_end_s[0] = 0.0;
+        end(cf);
+        return;
+    }
+    ivl_sim_rollout_note(&cf->group, IVL_CF_LANE, &e->now);
+}
+
+void ivl_cf_episode_look(ivl_cf_t *cf)
+{
+    if (cf->episode.running && ivl_sim_rollout_ended(&cf->group, IVL_CF_LANE, &cf->episode.now))
+    {
+        end(cf);
+    }
+}

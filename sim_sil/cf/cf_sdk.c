@@ -1,0 +1,195 @@
+/// @file cf_sdk.c
+/// The functions of the SDK that the app calls, answered by the simulated vehicle.
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "FreeRTOS.h"
+#include "app_channel.h"
+#include "cf_vehicle.h"
+#include "commander.h"
+#include "crtp.h"
+#include "crtp_commander_high_level.h"
+#include "debug.h"
+#include "log.h"
+#include "mem.h"
+#include "param.h"
+#include "platform_defaults.h"
+#include "pm.h"
+#include "supervisor.h"
+#include "task.h"
+#include "usec_time.h"
+
+ivl_cf_platform_t ivl_cf_platform;
+
+// ---- time
+
+uint64_t usecTimestamp(void)
+{
+    return ivl_cf_time_us(&ivl_cf_the);
+}
+
+TickType_t xTaskGetTickCount(void)
+{
+    return ivl_cf_now_ms(&ivl_cf_the);
+}
+
+/// The vehicle calls the app's task when its wait is over, so there is nothing left to wait for.
+void vTaskDelay(TickType_t ticks)
+{
+    (void)ticks;
+}
+
+// ---- the vehicle
+
+float pmGetBatteryVoltage(void)
+{
+    return ivl_cf_the.power.vbat_V;
+}
+
+bool supervisorCanFly(void)
+{
+    return ivl_cf_supervisor_motors_allowed(&ivl_cf_the.supervisor);
+}
+
+bool crtpIsConnected(void)
+{
+    return ivl_cf_the.link_up;
+}
+
+bool crtpCommanderHighLevelIsStopped(void)
+{
+    return ivl_cf_the.planner.plan == IVL_CF_PLAN_STOPPED;
+}
+
+int crtpCommanderHighLevelGoTo(const float x, const float y, const float z, const float yaw, const float duration_s, const bool relative)
+{
+    const float p_W_m[3] = {x, y, z};
+    return ivl_cf_hl_go_to(&ivl_cf_the, relative, false, p_W_m, yaw, duration_s);
+}
+
+void commanderRelaxPriority(void)
+{
+    ivl_cf_relax(&ivl_cf_the);
+}
+
+/// The core runs with the world's ticks.
+bool app_has_rate(float tick_hz)
+{
+    return tick_hz >= ivl_cf_the.model.firmware.tick_hz && tick_hz <= ivl_cf_the.model.firmware.tick_hz;
+}
+
+// ---- the host
+
+int appchannelSendDataPacket(void *data, size_t length)
+{
+    return ivl_cf_packets_put(&ivl_cf_the.from_app, data, length) ? 1 : 0;
+}
+
+size_t appchannelReceiveDataPacket(void *buffer, size_t max_length, int timeout_ms)
+{
+    ivl_cf_the.app_wake_ms = ivl_cf_the.t_ms + (uint64_t)timeout_ms;
+    return ivl_cf_packets_take(&ivl_cf_the.to_app, buffer, max_length);
+}
+
+static void print(const char *format, va_list arguments)
+{
+    char line[160];
+    (void)vsnprintf(line, sizeof line, format, arguments);
+    ivl_cf_text_put(&ivl_cf_the.text, line);
+}
+
+void ivl_cf_print(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    print(format, arguments);
+    va_end(arguments);
+}
+
+void sdk_print(const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    print(format, arguments);
+    va_end(arguments);
+}
+
+// ---- values by name
+
+static const uint16_t NOT_FOUND = 0xffffu;
+
+logVarId_t logGetVarId(const char *group, const char *name)
+{
+    size_t              n;
+    const ivl_cf_log_t *logs = ivl_cf_logs(&ivl_cf_the, &n);
+    for (size_t i = 0; i < n; i++)
+    {
+        if (strcmp(logs[i].group, group) == 0 && strcmp(logs[i].name, name) == 0)
+        {
+            return (logVarId_t)i;
+        }
+    }
+    return NOT_FOUND;
+}
+
+/// Of variables of type float: the app asks for no others.
+float logGetFloat(logVarId_t varid)
+{
+    size_t              n;
+    const ivl_cf_log_t *logs = ivl_cf_logs(&ivl_cf_the, &n);
+    float               value = 0.0f;
+    if (varid < n && logs[varid].type == IVL_CF_LOG_F32)
+    {
+        memcpy(&value, logs[varid].address, sizeof value);
+    }
+    return value;
+}
+
+paramVarId_t paramGetVarId(const char *group, const char *name)
+{
+    size_t                n;
+    const ivl_cf_param_t *params = ivl_cf_params(&ivl_cf_the, &n);
+    for (size_t i = 0; i < n; i++)
+    {
+        if (strcmp(params[i].group, group) == 0 && strcmp(params[i].name, name) == 0)
+        {
+            return (paramVarId_t){.id = (uint16_t)i, .index = (uint16_t)i};
+        }
+    }
+    return (paramVarId_t){.id = NOT_FOUND};
+}
+
+/// Of parameters of one byte: the app asks for no others.
+unsigned int paramGetUint(paramVarId_t varid)
+{
+    size_t                n;
+    const ivl_cf_param_t *params = ivl_cf_params(&ivl_cf_the, &n);
+    const bool            known = varid.id < n && params[varid.id].type == IVL_CF_PARAM_U8;
+    return known ? *(const uint8_t *)params[varid.id].address : 0u;
+}
+
+// ---- memories
+
+static const MemoryHandlerDef_t *handler;
+
+void memoryRegisterHandler(const MemoryHandlerDef_t *handlerDef)
+{
+    handler = handlerDef;
+}
+
+static uint32_t app_memory_size(void)
+{
+    return handler->getSize(handler->internal_id);
+}
+
+static bool app_memory_read(uint32_t address, uint32_t size, uint8_t *bytes)
+{
+    return size <= UINT8_MAX && handler->read(handler->internal_id, address, (uint8_t)size, bytes);
+}
+
+const ivl_cf_memory_t *ivl_cf_app_memory(void)
+{
+    static const ivl_cf_memory_t memory = {.type = MEM_TYPE_APP, .size = app_memory_size, .read = app_memory_read};
+    return (handler != NULL) ? &memory : NULL;
+}

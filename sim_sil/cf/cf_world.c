@@ -1,0 +1,162 @@
+/// @file cf_world.c
+/// The world between landings: a floor to start from and to come down to, and the way back to the start point.
+#include <string.h>
+
+#include "app_convert.h"
+#include "cf_vehicle.h"
+
+static const double FLOOR_Z_M = 0.0;
+
+// of the generator's streams, those that no landing is likely to ask for
+static const uint64_t STREAM_BETWEEN = 0xFFFFFFFF00000000u;
+
+static void place_on_floor(ivl_cf_t *cf, double x_m, double y_m, const double q_WB[4])
+{
+    ivl_sim_kin_t kin;
+    memset(&kin, 0, sizeof kin);
+    kin.p_WB_m[0] = x_m;
+    kin.p_WB_m[1] = y_m;
+    kin.p_WB_m[2] = FLOOR_Z_M;
+    memcpy(kin.q_WB, q_WB, sizeof kin.q_WB);
+    ivl_sim_world_rest_legs(&cf->model, &kin);
+    ivl_sim_world_place(&cf->group, IVL_CF_LANE, &kin);
+    cf->grounded = true;
+}
+
+static void start(ivl_cf_t *cf, double z_m)
+{
+    const double        p[3] = {(double)cf->set.start_x_m, (double)cf->set.start_y_m, z_m}, v[3] = {0.0, 0.0, 0.0};
+    const ivl_sim_rng_t rng = {cf->seed, STREAM_BETWEEN + cf->n_reset++};
+    cf->zero_us = (cf->t_ms / cf->tick_ms + 1) * cf->tick_ms * 1000u;
+    cf->grounded = false;
+    ivl_sim_world_start(&cf->group, IVL_CF_LANE, &rng, p, v);
+}
+
+void ivl_cf_world_boot(ivl_cf_t *cf)
+{
+    const double     level[4] = {0.0, 0.0, 0.0, 1.0};
+    const float      off[4] = {0.0f, 0.0f, 0.0f, 0.0f};
+    ivl_sim_world_t *w = ivl_cf_world(cf);
+    start(cf, FLOOR_Z_M);
+    place_on_floor(cf, (double)cf->set.start_x_m, (double)cf->set.start_y_m, level);
+    ivl_sim_rotor_command(&cf->model, &w->rotor, off);
+    memset(w->rotor.speed_radps, 0, sizeof w->rotor.speed_radps);
+}
+
+static void forget_requests(app_t *app)
+{
+    atomic_store(&app->command_in.full, false);
+    app->in.cmd = (ivl_command_t){.request = IVL_REQUEST_IDLE};
+    if (app->pending.what == APP_WAITS_FOR_COMMAND)
+    {
+        app->pending.what = APP_WAITS_FOR_NOTHING;
+    }
+    atomic_store(&app->was_handed_back, false);
+    app->owner = APP_OWNER_STOCK;
+}
+
+void ivl_cf_world_reset(ivl_cf_t *cf)
+{
+    const uint32_t   now_ms = ivl_cf_now_ms(cf);
+    const ivl_vec3_t p = {cf->set.start_x_m, cf->set.start_y_m, cf->set.start_z_m};
+    cf->episode.running = false;
+    start(cf, (double)cf->set.start_z_m);
+    forget_requests(&ivl_app);
+    ivl_cf_supervisor_fly(&cf->supervisor, now_ms);
+    ivl_cf_planner_hover(&cf->planner, p, 0.0f, now_ms);
+    ivl_cf_commander_init(&cf->commander);
+    const ivl_cf_setpoint_t hover = ivl_cf_planner_next(&cf->planner, now_ms);
+    (void)ivl_cf_commander_set(&cf->commander, &hover, IVL_CF_PRIORITY_HIGH_LEVEL, now_ms);
+    ivl_cf_stock_reset(&cf->stock);
+    ivl_cf_estimate_reset(&cf->estimate);
+    ivl_cf_power_full(&cf->power);
+    cf->acc_g[0] = cf->acc_g[1] = 0.0f;
+    cf->acc_g[2] = (float)cf->model.raw.world_gravity_mps2 / APP_MPS2_PER_G;
+    const float hover_N = (float)(cf->model.mass_total_kg * cf->model.raw.world_gravity_mps2 / IVL_SIM_MOTORS);
+    ivl_app.collective_norm = app_norm_of_N(hover_N);
+    for (int i = 0; i < 4; i++)
+    {
+        cf->motor_N[i] = hover_N;
+    }
+}
+
+// ---- motion
+
+/// It stands on its legs or lies on its back, whichever is nearer, and keeps its heading.
+static void come_to_rest(ivl_cf_t *cf)
+{
+    const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
+    const double       *q = kin.q_WB;
+    const ivl_rot_t     R = ivl_rot_from_quat(q);
+    const bool          upright = R.row[2].z >= 0.0;
+    double              s, c;
+    ivl_sim_sincos(0.5 * ivl_sim_atan2(R.row[1].x, R.row[0].x), &s, &c);
+    // a turn about z, or the same turn after half a turn about x
+    const double level[4] = {0.0, 0.0, s, c}, on_back[4] = {c, s, 0.0, 0.0};
+    place_on_floor(cf, kin.p_WB_m[0], kin.p_WB_m[1], upright ? level : on_back);
+}
+
+static void rest(ivl_cf_t *cf)
+{
+    ivl_sim_world_t       *w = ivl_cf_world(cf);
+    const ivl_sim_kin_t    kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
+    const ivl_rot_t        R = ivl_rot_from_quat(kin.q_WB);
+    const ivl_sim_thrust_t load = ivl_sim_rotor_step(&cf->model, &w->rotor, kin.p_WB_m[2], kin.q_WB, cf->model.tick_s);
+    w->left_s = 0.0;
+    w->restart = true;
+    cf->grounded = !(load.thrust_N * R.row[2].z > cf->model.mass_total_kg * cf->model.raw.world_gravity_mps2);
+}
+
+/// The motion that has been due since the last tick.
+static void move(ivl_cf_t *cf)
+{
+    if (cf->grounded)
+    {
+        rest(cf);
+        return;
+    }
+    while (!ivl_sim_world_ready(&cf->group, IVL_CF_LANE))
+    {
+        ivl_sim_group_step(&cf->group);
+    }
+}
+
+/// A landing knows no floor: it may begin anywhere below the ceiling.
+static void find_floor(ivl_cf_t *cf)
+{
+    const double level[4] = {0.0, 0.0, 0.0, 1.0};
+    if (cf->grounded || cf->episode.running)
+    {
+        return;
+    }
+    if (ivl_sim_world_diverged(&cf->group.state, IVL_CF_LANE))
+    {
+        place_on_floor(cf, (double)cf->set.start_x_m, (double)cf->set.start_y_m, level);
+    }
+    else if (cf->group.state.p_WB_m.z[IVL_CF_LANE] <= FLOOR_Z_M && cf->group.state.v_WB_mps.z[IVL_CF_LANE] < 0.0)
+    {
+        come_to_rest(cf);
+    }
+}
+
+void ivl_cf_world_tick(ivl_cf_t *cf)
+{
+    if (ivl_cf_world(cf)->n_tick > 0)
+    {
+        move(cf);
+        ivl_cf_episode_look(cf);
+        find_floor(cf);
+    }
+    const ivl_phase_t before = ivl_app.state.phase;
+    ivl_sim_world_tick(&cf->group, IVL_CF_LANE);
+    const ivl_phase_t after = ivl_app.state.phase;
+    if (cf->episode.running)
+    {
+        ivl_sim_rollout_note(&cf->group, IVL_CF_LANE, &cf->episode.now);
+    }
+    const bool waited = before == IVL_PHASE_IDLE || before == IVL_PHASE_READY;
+    if (waited && (after == IVL_PHASE_APPROACH || after == IVL_PHASE_FLIP))
+    {
+        ivl_cf_episode_begin(cf);
+    }
+}
