@@ -38,7 +38,7 @@ def test_permuted_labels_give_one_half(model: str) -> None:
 
 
 def test_no_condition_is_in_training_and_test() -> None:
-    """Labels that are the condition's own coin toss can be remembered, but not foreseen (120 tosses: AUC 0.5 +- 0.05)."""
+    """Labels that are the condition's own coin toss can be remembered, but not foreseen (120 tosses: 0.5 +- 0.05)."""
     rng = np.random.default_rng(2)
     place = rng.normal(size=(N_CONDITIONS, 2))
     x = place[CONDITION] + 1e-3 * rng.normal(size=(len(CONDITION), 2))

@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from ivl.cli import bench, can_gateway, console, export, flash, learn, listing, report, rollout, sweep
+from ivl.cli import bench, can_gateway, console, export, figs, flash, learn, listing, report, rollout, sweep
 from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
 
 app = typer.Typer(
@@ -26,6 +26,7 @@ app.command("can-gateway", help=can_gateway.HELP)(can_gateway.can_gateway)
 app.command("sweep", help=sweep.HELP)(sweep.sweep)
 app.command("map", help=sweep.MAP_HELP)(sweep.map_)
 app.command("report", help=report.HELP)(report.report)
+app.command("figs", help=figs.HELP)(figs.figs)
 app.command("export", help=export.HELP)(export.export)
 
 

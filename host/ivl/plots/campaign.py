@@ -1,0 +1,174 @@
+"""What the figures of a campaign share: the tables of a run, one set-up out of them, and words for titles."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd  # type: ignore[import-untyped]
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from ivl import model
+from ivl.analysis import region
+from ivl.analysis.intervals import Estimate
+from ivl.analysis.rates import RATE, SOLVED_RATE
+from ivl.analysis.separability import separability
+from ivl.errors import ConfigError
+from ivl.plots import style
+from ivl.sweep import store
+
+RATE_MAP = "cividis_r"
+"""Landing rate: even in lightness, the same to readers with and without colour vision; much ink is much success."""
+LABELS = {
+    "vx_mps": "$V_x$ (m/s)",
+    "vz_mps": "$V_z$ (m/s)",
+    "d_ceil_m": "$d$ (m)",
+    "rrev_per_s": "RREV (1/s)",
+    "of_y_radps": "$OF_y$ (rad/s)",
+    "moment_y_Nmm": "$M_{yd}$ (N mm)",
+    "speed_mps": "$V$ (m/s)",
+    "angle_deg": r"$\varphi$ (°)",
+}
+_PREFERRED = {"vehicle": "habas2021", "gear_set": model.DEFAULT_GEAR_SET, "gear": "wide_short", "learner": "bo"}
+SETUP = tuple(_PREFERRED)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Tables of a sweep's run folder (see `ivl.sweep.schema`); `episodes` may have no rows."""
+
+    trials: pd.DataFrame
+    episodes: pd.DataFrame
+
+    def setups(self, *columns: str) -> list[dict[str, str]]:
+        """Distinct values of some columns of `SETUP`, the preferred first."""
+        found = self.trials[list(columns)].astype(str).drop_duplicates().to_dict("records")
+        return sorted(found, key=lambda s: [(s[c] != _PREFERRED[c], s[c]) for c in columns])
+
+    def select(self, **chosen: str | None) -> "Campaign":
+        """The part with the given values of the columns `SETUP`; None selects nothing.
+
+        Raises:
+            ConfigError: There is no such part.
+        """
+        part = self
+        for column, value in chosen.items():
+            if value is None:
+                continue
+            present = sorted(part.trials[column].astype(str).unique())
+            if value not in present:
+                raise ConfigError(f"{column}: value {value!r} is not in this run (allowed {', '.join(present)})")
+            part = replace(
+                part,
+                trials=part.trials[part.trials[column] == value],
+                episodes=part.episodes[part.episodes[column] == value],
+            )
+        return part
+
+    def preferred(self, *columns: str) -> "Campaign":
+        """The part with the preferred value of each column (the first by name if that is not there)."""
+        return self.select(**self.setups(*columns)[0])
+
+    def solved(self) -> pd.Series:
+        """Mask of the trials that triggered and reached a landing rate of 0.8."""
+        return (self.trials["n_triggered"] > 0) & (self.trials[RATE] >= SOLVED_RATE)
+
+    def title(self, *columns: str) -> str:
+        """Values of some columns of `SETUP`, in words."""
+        return ", ".join(words(self.trials, column) for column in columns)
+
+
+def load(runs: Sequence[Path]) -> Campaign:
+    """Read the run folders of one or several sweeps as one campaign.
+
+    Raises:
+        StoreError: One holds no sweep.
+        ConfigError: One holds no finished trial.
+    """
+    trials, episodes = [], []
+    for run in runs:
+        store.read_manifest(run)
+        trials.append(_plain(store.read_trials(run)))
+        episodes.append(_plain(store.read_episodes(run)))
+        if trials[-1].empty:
+            raise ConfigError(f"{run}: holds no finished trial")
+    return Campaign(pd.concat(trials, ignore_index=True), pd.concat(episodes, ignore_index=True))
+
+
+def _plain(frame: pd.DataFrame) -> pd.DataFrame:
+    """Names as plain text: categories of different runs do not mix."""
+    return frame.astype(dict.fromkeys(SETUP, object))
+
+
+def words(trials: pd.DataFrame, column: str) -> str:
+    """The values of a column as a reader would say them."""
+    values = sorted(trials[column].astype(str).unique())
+    if column == "gear":
+        return ", ".join(gear_title(value) for value in values)
+    return ", ".join(values)
+
+
+def gear_title(gear: str) -> str:
+    """Name of a landing gear as the paper writes it: Wide-Short for wide_short."""
+    *width, length = (word.capitalize() for word in gear.split("_"))
+    return f"{' '.join(width)}-{length}" if width else length
+
+
+def points(data: Campaign) -> pd.DataFrame:
+    """One point per trial of the selected part, the better ones last, so that they are drawn on top.
+
+    Raises:
+        ConfigError: No trial ever triggered.
+    """
+    found = region.trial_points(data.trials)
+    if found.empty:
+        raise ConfigError("no trial of this part of the run ever triggered: there is nothing to draw")
+    return found.sort_values("rate_norm", kind="stable")
+
+
+def auc_text(found: pd.DataFrame, space: str) -> str:
+    """Cross-validated AUC of success in one of `region.CUE_SETS`, for a title."""
+    result = separability(found[list(region.CUE_SETS[space])], found["success"], found["condition"])
+    return f"AUC {interval(result.auc)}" if np.isfinite(result.auc.value) else "AUC not defined: one outcome alone"
+
+
+def interval(estimate: Estimate, digits: int = 3) -> str:
+    """A number with its interval."""
+    return f"{estimate.value:.{digits}f} ({estimate.low:.{digits}f} to {estimate.high:.{digits}f})"
+
+
+def space_and_planes(figure: Figure, from_x: float) -> tuple[Any, Any]:
+    """A three-dimensional axis at the left and a place for a colour bar below it; the layout gets the rest.
+
+    The automatic layout leaves wide margins around three-dimensional axes, so these are placed by hand.
+
+    Args:
+        figure: The figure.
+        from_x: Where the rest begins, as a share of the width.
+    """
+    engine: Any = figure.get_layout_engine()
+    engine.set(rect=(from_x, 0.0, 1.0 - from_x, 1.0))
+    space: Any = figure.add_axes((0.0, 0.16, from_x - 0.02, 0.75), projection="3d")
+    return space, figure.add_axes((0.2 * from_x, 0.11, 0.6 * from_x, 0.025))
+
+
+def label_3d(axis: Any, columns: tuple[str, str, str]) -> None:
+    """Labels, ticks and looks of a three-dimensional axis."""
+    for name, column in zip("xyz", columns, strict=True):
+        getattr(axis, f"set_{name}label")(LABELS[column], fontsize=style.NORMAL, labelpad=1)
+        one = getattr(axis, f"{name}axis")
+        one.set_pane_color((1.0, 1.0, 1.0, 1.0))
+        one._axinfo["grid"].update(color="#E0E0E0", linewidth=0.5)
+        one.set_major_locator(MaxNLocator(4))
+    axis.tick_params(labelsize=style.SMALL, pad=0)
+    axis.set_box_aspect((1, 1, 0.85), zoom=0.95)
+
+
+def label_2d(axis: Axes, x: str, y: str) -> None:
+    """Labels and looks of a plane axis."""
+    axis.set_xlabel(LABELS[x])
+    axis.set_ylabel(LABELS[y])
+    style.finish(axis)
