@@ -9,6 +9,7 @@ import json
 import platform
 import subprocess
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,7 +23,7 @@ from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.learn import LearningRun, Progress, recent_rate
 from ivl.outcome import four_leg
-from ivl.source import WorldSource
+from ivl.source import RolloutSource, WorldSource
 from ivl.store import DISCARDED, SCHEMA_VERSION, SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest, write_json
 from ivl.world import World
 
@@ -37,11 +38,13 @@ class Hooks:
         on_start: Run folder, known before the first rollout.
         on_episode: After each stored episode.
         on_stage: Before each stage of the search for the best possible policy: (stage, number of stages).
+        on_event: With a line of text, when a link or a vehicle has something to tell.
     """
 
     on_start: Callable[[Path], None] | None = None
     on_episode: Callable[[Progress], None] | None = None
     on_stage: Callable[[int, int], None] | None = None
+    on_event: Callable[[str], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -93,15 +96,19 @@ def run(
     Raises:
         StoreError: The folder cannot be used, or its run is of another configuration.
         RolloutError: Flying failed; the run can be resumed.
+        LinkError: The vehicle at the end of the link cannot be reached.
     """
     hooks = hooks or Hooks()
     world = chosen.make_world()
     manifest = make_manifest(chosen, world, n_trials, uri)
-    source = links.open_source(uri, chosen, threads) if uri else WorldSource(world, chosen, threads)
-    with _open(folder, chosen, manifest, resume) as store:
+    with ExitStack() as stack:
+        source = _open_source(uri, chosen, world, threads, folder, hooks)
+        stack.callback(source.close)
+        store = stack.enter_context(_open(folder, chosen, manifest, resume))
         if hooks.on_start:
             hooks.on_start(folder)
         LearningRun(chosen, source, store, n_trials or 1).run(hooks.on_episode)
+        source.close()
         history, rollouts = store.episodes(), store.rollouts()
         best = _best(folder, world, chosen, threads, hooks)
         verdicts = assess.judge(world, chosen, best, history, rollouts, threads)
@@ -115,6 +122,14 @@ def run(
         }
         write_json(folder / "result.json", {**summary, "verdicts": [asdict(v) for v in verdicts]})
     return RunResult(folder, chosen, world, best, verdicts, history, rollouts, summary)
+
+
+def _open_source(
+    uri: str | None, chosen: Experiment, world: World, threads: int | None, folder: Path, hooks: Hooks
+) -> RolloutSource:
+    if uri is None:
+        return WorldSource(world, chosen, threads)
+    return links.open_source(uri, chosen, threads, folder, hooks.on_event)
 
 
 def read_config(folder: Path) -> tuple[Experiment, int | None]:

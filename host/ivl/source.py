@@ -53,6 +53,10 @@ class RolloutSource(Protocol):
         """
         ...
 
+    def close(self) -> None:
+        """Give back what the source holds when no more is to be flown; calling it again does nothing."""
+        ...
+
 
 class WorldSource:
     """The simulator in this process: a whole plan in one native batch."""
@@ -79,3 +83,6 @@ class WorldSource:
         if not good.all():
             reasons = sorted({self.world.end_reason(code) for code in outcomes.end_reason[~good]})
             yield Flown(np.flatnonzero(~good), outcomes[~good], f"simulation: {', '.join(reasons)}")
+
+    def close(self) -> None:
+        """Nothing to give back."""

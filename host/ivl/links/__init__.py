@@ -1,30 +1,49 @@
 """Ways to fly that are not the simulator in this process; each is chosen by the scheme of a URI.
 
-source = open_source("pil://", experiment, threads=None)
+source = open_source("udp://127.0.0.1:19850", experiment)
 """
 
 from collections.abc import Callable
+from pathlib import Path
 
-from ivl.errors import ConfigError
+from ivl.errors import ConfigError, LinkError
 from ivl.experiment import Experiment
 from ivl.links import pil
 from ivl.source import RolloutSource
 
-Opener = Callable[[str, Experiment, int | None], RolloutSource]
-
-SCHEMES: dict[str, Opener] = {"pil": pil.PilSource}
-"""Scheme of a URI -> what opens it."""
+VEHICLE_SCHEMES = ("udp", "radio", "usb", "tcp", "serial")
+"""Links to a vehicle, a real or a software one."""
 
 
-def open_source(uri: str, experiment: Experiment, threads: int | None = None) -> RolloutSource:
+def open_source(
+    uri: str,
+    experiment: Experiment,
+    threads: int | None = None,
+    folder: Path | None = None,
+    say: Callable[[str], None] | None = None,
+) -> RolloutSource:
     """The source that a URI names.
+
+    Args:
+        uri: pil://, or a link to a vehicle.
+        experiment: What is flown.
+        threads: Worker threads; for pil://.
+        folder: Where a vehicle's journal and recordings go.
+        say: Called with each line for people that flying brings about.
 
     Raises:
         ConfigError: No such scheme, or the rest of the URI makes no sense for it.
-        RolloutError: The other end cannot be reached or started.
+        RolloutError: The other end cannot be started, or must not fly.
+        LinkError: The other end cannot be reached.
     """
     scheme, separator, _ = uri.partition("://")
-    if not separator or scheme not in SCHEMES:
-        allowed = ", ".join(f"{name}://" for name in SCHEMES)
+    if separator and scheme == "pil":
+        return pil.PilSource(uri, experiment, threads)
+    if not separator or scheme not in VEHICLE_SCHEMES:
+        allowed = ", ".join(f"{name}://" for name in ("pil", *VEHICLE_SCHEMES))
         raise ConfigError(f"uri: value {uri!r} is unknown (allowed {allowed})")
-    return SCHEMES[scheme](uri, experiment, threads)
+    try:
+        from ivl.links import crazyflie  # cflib takes most of a second to load
+    except ImportError as error:
+        raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
+    return crazyflie.CrazyflieSource(uri, experiment, crazyflie.Options(folder=folder, say=say or (lambda _: None)))

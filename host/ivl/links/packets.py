@@ -82,6 +82,9 @@ class Packet:
         return self.values[name]
 
 
+_TYPES = frozenset(PacketType)
+
+
 def encode(kind: PacketType, **values: float) -> bytes:
     """Bytes of a packet; every member must be given.
 
@@ -103,7 +106,7 @@ def encode(kind: PacketType, **values: float) -> bytes:
 
 def decode(data: bytes) -> Packet | None:
     """A packet of the vehicle; None unless type, version and size are right."""
-    if len(data) < 2 or data[0] not in PacketType or data[1] != native.library().wire_version():
+    if len(data) < 2 or data[0] not in _TYPES or data[1] != native.library().wire_version():
         return None
     kind = PacketType(data[0])
     dtype = _dtype(kind)

@@ -129,6 +129,9 @@ class PilSource:
             self.chips.check()
             yield flown
 
+    def close(self) -> None:
+        """The chips end with the world that they fly."""
+
 
 def _keep(_: Chips) -> None:
     """Holds a reference until a world is gone."""

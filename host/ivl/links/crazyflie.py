@@ -1,0 +1,248 @@
+"""Rollouts flown by a vehicle at the other end of a link: `ivl learn EXPERIMENT --uri udp://... | radio://...`.
+
+A rollout is scored only if the vehicle confirmed its policy, flew it to an end, and said so. Whatever goes wrong before
+that (lost link, restarted server, an abort that is not the policy's) discards the flight, and the same rollout is flown
+again: nothing is scored wrongly, and nothing is lost.
+"""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ivl import native
+from ivl.errors import LinkError, RolloutError
+from ivl.experiment import Experiment
+from ivl.links import preflight, sil
+from ivl.links.clock import WallClock
+from ivl.links.connection import check_uri
+from ivl.links.deadlines import DEADLINES, Deadlines
+from ivl.links.episode import Episode, Field, Landing, Rollout, safe_or_why, start_point
+from ivl.links.fields import Room, SilField
+from ivl.links.operators import ConsoleOperator, Operator, OperatorStopped
+from ivl.links.tables import Session
+from ivl.links.vehicle import PolicyRefused, Vehicle
+from ivl.outcome import Outcomes, valid
+from ivl.source import Flown, Plan
+
+ATTEMPTS_MAX = 10
+_AGAIN_S = 0.2
+JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to fly.
+
+    Attributes:
+        folder: Where the journal and the recordings go, None: nowhere.
+        operator: Who stands beside a real vehicle; None: asked in the terminal.
+        rehearse: Fly a software vehicle as if it were a drone: take-off, operator, no simulator's truth.
+        keep_recordings: Download the flight recorder of a software vehicle too (of a drone always).
+        say: Called with each line for people.
+        deadlines: Limits of the link.
+    """
+
+    folder: Path | None = None
+    operator: Operator | None = None
+    rehearse: bool = False
+    keep_recordings: bool = False
+    say: Say = lambda _: None
+    deadlines: Deadlines = DEADLINES
+
+
+class CrazyflieSource:
+    """One vehicle, one connection; reconnects by itself when it is lost. A context manager, or call `close`."""
+
+    def __init__(self, uri: str, experiment: Experiment, options: Options | None = None) -> None:
+        """Connect, check and configure the vehicle.
+
+        Raises:
+            ConfigError: The URI is none, or the approach does not fit under the ceiling.
+            LinkError: The vehicle cannot be reached.
+            RolloutError: It must not fly as it is; the message says why and what to do.
+        """
+        check_uri(uri)
+        self.uri, self._experiment, self.options = uri, experiment, options or Options()
+        self.world = experiment.make_world()
+        self._vehicle: Vehicle | None = None
+        self._field: Field | None = None
+        self.n_discarded = 0
+        """Flights that were not scored and were flown again."""
+        self._connect()
+
+    # ---- RolloutSource
+
+    def fly(self, plan: Plan) -> Iterator[Flown]:
+        """Fly every row of the plan, one after the other; each is handed over as soon as it is known.
+
+        Raises:
+            RolloutError: A rollout was discarded ten times, the vehicle stayed away, or the operator stopped.
+        """
+        for i in range(len(plan.theta)):
+            rollout = Rollout(float(plan.theta[i, 0]), float(plan.theta[i, 1]), int(plan.seed[i]), int(plan.stream[i]))
+            yield self._fly_until_known(np.array([i], dtype=np.intp), rollout)
+
+    def close(self) -> None:
+        """Bring the vehicle down, disarm it and close the link; safe to call at any time, and again."""
+        vehicle, self._vehicle = self._vehicle, None
+        if vehicle is None:
+            return
+        try:
+            if not vehicle.session.cf.lost:
+                done = safe_or_why(vehicle)
+                if not self._is_sil:
+                    self.options.say(f"vehicle: {done}")
+                self._give_back(vehicle)
+        finally:
+            vehicle.session.close()
+
+    def __enter__(self) -> "CrazyflieSource":
+        """The source itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close."""
+        self.close()
+
+    # ---- flying
+
+    def fly_one(self, rollout: Rollout) -> Landing:
+        """Fly one rollout once, without a second attempt (errors as `Episode.fly`)."""
+        vehicle, field = self._vehicle, self._field
+        if vehicle is None or field is None:
+            raise LinkError(f"{self.uri}: the link is closed")
+        landing = Episode(vehicle, self._experiment).fly(field, rollout)
+        self._keep(landing)
+        return landing
+
+    def _fly_until_known(self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout) -> Flown:
+        for attempt in range(1, ATTEMPTS_MAX + 1):
+            try:
+                if self._vehicle is None:
+                    self._return()
+                outcome = self.fly_one(rollout).outcome
+                good = bool(valid(outcome).all())
+                reason = "" if good else f"simulation: {self.world.end_reason(int(outcome['end_reason'][0]))}"
+                return Flown(index, outcome, reason)
+            except PolicyRefused as error:
+                self._note(rollout, f"refused: {error}")
+                return Flown(index, _refused(), f"vehicle: {error}")
+            except OperatorStopped:
+                raise
+            except LinkError as error:
+                self._discard(rollout, attempt, error)
+                self._drop()
+            except RolloutError as error:
+                self._discard(rollout, attempt, error)
+        raise RolloutError(
+            f"{self.uri}: a rollout was discarded {ATTEMPTS_MAX} times in a row; the last reason is above"
+        )
+
+    def _discard(self, rollout: Rollout, attempt: int, error: Exception) -> None:
+        self.n_discarded += 1
+        self._note(rollout, f"discarded: {error}")
+        self.options.say(f"flight discarded, flown again (attempt {attempt} of {ATTEMPTS_MAX}): {error}")
+
+    # ---- connection
+
+    @property
+    def _is_sil(self) -> bool:
+        return isinstance(self._field, SilField)
+
+    def _connect(self) -> None:
+        session = Session(self.uri, self.options.deadlines)
+        try:
+            software = sil.is_sil(session)
+            vehicle = Vehicle(session, sil.lock_step(session) if software else WallClock())
+            found = list(preflight.checks(vehicle))
+            vehicle.configure(self.world)
+            if software and not self.options.rehearse:
+                self._field = SilField(vehicle, self._experiment, self.options.keep_recordings)
+                found = [check for check in found if check.name in ("tables", "link", "phase")]
+            else:
+                start_W_m = start_point(self.world, self._experiment)
+                self._field = Room(vehicle, self.world, start_W_m, self.options.operator or ConsoleOperator())
+                found.append(preflight.policy_range(vehicle, self._experiment))
+            if failed := preflight.failures(found):
+                raise RolloutError(f"{self.uri}: not fit to fly: {failed}")
+        except BaseException:
+            session.close()
+            raise
+        self._vehicle = vehicle
+
+    def _return(self) -> None:
+        """Connect again, for as long as a vehicle may stay away."""
+        end_s = time.monotonic() + self.options.deadlines.return_s
+        while True:
+            try:
+                self._connect()
+            except LinkError as error:
+                if time.monotonic() >= end_s:
+                    away_s = self.options.deadlines.return_s
+                    raise RolloutError(f"the vehicle stayed away for {away_s:g} s: {error}") from error
+                time.sleep(_AGAIN_S)
+            else:
+                self.options.say(f"connected again to {self.uri}")
+                return
+
+    def _drop(self) -> None:
+        """Forget a connection that is no good any more; the vehicle ends its flight by its own rules."""
+        vehicle, self._vehicle = self._vehicle, None
+        if vehicle is not None:
+            vehicle.session.close()
+
+    def _give_back(self, vehicle: Vehicle) -> None:
+        """Leave a software vehicle as it was found; a link that breaks now is only told."""
+        try:
+            if isinstance(self._field, SilField):
+                self._field.extras.close()
+            vehicle.clock.close()
+        except LinkError as error:
+            self.options.say(f"not restored: {error}")
+
+    # ---- journal
+
+    def _keep(self, landing: Landing) -> None:
+        self._note(landing.rollout, "flown", landing)
+        folder = self.options.folder
+        if folder is not None and landing.recording is not None:
+            (folder / RECORDINGS).mkdir(exist_ok=True)
+            name = f"{landing.rollout.seed:016x}-{landing.rollout.stream}.csv"
+            (folder / RECORDINGS / name).write_text(landing.recording.to_csv(), encoding="utf-8")
+
+    def _note(self, rollout: Rollout, what: str, landing: Landing | None = None) -> None:
+        """One line of JSON per flight, on the disk before the next begins."""
+        folder = self.options.folder
+        if folder is None:
+            return
+        line: dict[str, Any] = {
+            "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "seed": rollout.seed,
+            "stream": rollout.stream,
+            "rrev_c_per_s": rollout.rrev_c_per_s,
+            "moment_y_Nmm": rollout.moment_y_Nmm,
+            "what": what,
+        }
+        if landing is not None:
+            battery_V = landing.battery_V if np.isfinite(landing.battery_V) else None
+            line |= {"battery_V": battery_V, "n_legs": int(landing.outcome["n_legs"][0])}
+        with (folder / JOURNAL).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line, allow_nan=False) + "\n")
+
+
+def _refused() -> Outcomes:
+    """The outcome of a policy that was not flown, as the library gives it: nothing is known."""
+    outcome = np.zeros(1, dtype=native.library().outcome_dtype)
+    for name in outcome.dtype.names or ():
+        if outcome.dtype[name].kind == "f":
+            outcome[name] = np.nan
+    codes = range(int(native.library().outcome_fields["end_reason"].hi) + 1)
+    outcome["end_reason"] = next(code for code in codes if native.library().end_reason(code) == "refused")
+    return outcome

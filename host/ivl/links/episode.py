@@ -1,0 +1,178 @@
+"""One landing, from the ground or from a reset to its outcome: the one way to fly, whatever the link.
+
+    to the start point -> policy confirmed -> hover -> approach -> (the vehicle decides) -> outcome
+
+The only two differences between a drone and a software vehicle are how it comes to the start point, and who knows the
+outcome; both are objects here (`Field`).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ivl.errors import ConfigError, LinkError, RolloutError
+from ivl.experiment import Experiment
+from ivl.links.packets import Phase, Recording, Request
+from ivl.links.vehicle import Command, Snapshot, Vehicle
+from ivl.world import World
+
+OUTSIDE_RULES = frozenset(
+    ("config", "bypass", "battery_rest", "supervisor", "link", "setpoint", "host", "battery", "uncertain")
+)
+"""Safety rules that say something about the flight's surroundings and nothing about its policy."""
+HEIGHT_M_MIN = 0.3
+_READY_S, _APPROACH_S, _IDLE_S = 5.0, 5.0, 3.0
+_AFTER_READY = (Phase.APPROACH, Phase.FLIP, Phase.COAST, Phase.ATTACHED, Phase.DONE, Phase.ABORTED)
+
+Outcome = np.ndarray[Any, np.dtype[np.void]]
+Point = tuple[float, float, float]
+"""x, y, z in W, m."""
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """What is to be flown: policy (1/s, N mm) and the numbers that make a simulated landing repeatable."""
+
+    rrev_c_per_s: float
+    moment_y_Nmm: float
+    seed: int = 0
+    stream: int = 0
+
+
+@dataclass(frozen=True)
+class Landing:
+    """What came of it.
+
+    Attributes:
+        rollout: What was flown.
+        outcome: Its outcome record, shape (1,).
+        policy_seq: Number under which the vehicle confirmed the policy.
+        snapshot: What the vehicle latched at the trigger; its policy_seq is another if the trigger did not fire.
+        recording: Flight recorder, None if it was not asked for.
+        battery_V: Before take-off.
+    """
+
+    rollout: Rollout
+    outcome: Outcome
+    policy_seq: int
+    snapshot: Snapshot
+    recording: Recording | None
+    battery_V: float
+
+
+class Field(Protocol):
+    """Where is flown: how the vehicle gets to its start point, and who knows what came of the landing."""
+
+    def to_start(self) -> Point:
+        """Return when the vehicle hovers, not yet under the core's control; tells where the approach is to begin."""
+        ...
+
+    def before_approach(self, rollout: Rollout) -> None:
+        """Called in hover, with the policy in force."""
+        ...
+
+    def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
+        """Wait for the end of the landing and tell what came of it."""
+        ...
+
+
+class Episode:
+    """Flies landings of one experiment with one vehicle."""
+
+    def __init__(self, vehicle: Vehicle, experiment: Experiment) -> None:
+        """Fly the experiment's approach."""
+        self.vehicle, self._experiment = vehicle, experiment
+
+    def fly(self, field: Field, rollout: Rollout) -> Landing:
+        """Fly one landing.
+
+        Raises:
+            PolicyRefused: The vehicle does not fly this policy.
+            RolloutError: The landing must not be scored and can be flown again.
+            LinkError: The same, and the link is gone.
+        """
+        vehicle = self.vehicle
+        start_W_m = field.to_start()
+        battery_V = vehicle.battery_V
+        policy_seq = vehicle.put_policy(rollout.rrev_c_per_s, rollout.moment_y_Nmm)
+        vehicle.ask_for(Command(Request.HOVER, start_W_m), (Phase.READY,), _READY_S)
+        field.before_approach(rollout)
+        experiment = self._experiment
+        approach = Command(Request.APPROACH, start_W_m, experiment.speed_mps, math.radians(experiment.angle_deg))
+        vehicle.ask_for(approach, _AFTER_READY, _APPROACH_S)
+        outcome, recording = field.outcome(policy_seq)
+        self._check(policy_seq, outcome)
+        return Landing(rollout, outcome, policy_seq, vehicle.snapshot(), recording, battery_V)
+
+    def _check(self, policy_seq: int, outcome: Outcome) -> None:
+        """Refuse to score what was not this policy's landing."""
+        vehicle = self.vehicle
+        cause = vehicle.cause
+        if cause in OUTSIDE_RULES:
+            raise RolloutError(f"the vehicle aborted: {cause}")
+        seen = vehicle.watch.values.get("ivl.trg_seq")
+        if outcome["triggered"][0] and seen is not None and int(seen) != policy_seq:
+            raise RolloutError(f"the trigger fired for policy {int(seen)}, not {policy_seq}")
+
+
+def start_point(world: World, experiment: Experiment) -> Point:
+    """Where an approach has to begin so that full speed is held before the ceiling, and x = 0 is reached at it.
+
+    Raises:
+        ConfigError: That is below the floor.
+    """
+    record, _ = world.native_model.config()
+    accel_mps2, h_ceil_m = float(record["ivl.approach_accel"][0]), float(record["ivl.h_ceil"][0])
+    hold_s = float(world.params.values["start.hold_time"])
+    speed_mps, angle_rad = experiment.speed_mps, math.radians(experiment.angle_deg)
+    path_m = 0.5 * speed_mps**2 / accel_mps2 + speed_mps * hold_s
+    start = (-path_m * math.cos(angle_rad), 0.0, h_ceil_m - path_m * math.sin(angle_rad))
+    if start[2] < HEIGHT_M_MIN:
+        raise ConfigError(
+            f"speed_mps: value {speed_mps:g} m/s at {experiment.angle_deg:g} degrees needs {path_m:.2f} m below a "
+            f"ceiling at {h_ceil_m:.2f} m: the start would be {start[2]:.2f} m above the floor (allowed from "
+            f"{HEIGHT_M_MIN} m)"
+        )
+    return start
+
+
+def make_safe(vehicle: Vehicle) -> str:
+    """Bring a vehicle down and disarm it, whatever it does; returns what was done, in words.
+
+    After the trigger nothing is interrupted: half a flip is worse than a whole one.
+
+    Raises:
+        LinkError: The link is gone; the vehicle then ends its flight by its own rules.
+        RolloutError: It did not come down in time; it was disarmed all the same.
+    """
+    done = []
+    try:
+        if vehicle.phase in (Phase.FLIP, Phase.COAST):
+            vehicle.wait(lambda: vehicle.phase in (Phase.ATTACHED, Phase.DONE), 10.0, "end of the flip")
+            done.append("flip completed")
+        if vehicle.phase in (Phase.READY, Phase.APPROACH):
+            vehicle.ask_for(Command(Request.ABORT), (Phase.ABORTED,), _IDLE_S)
+        if vehicle.phase == Phase.ABORTED:
+            vehicle.wait(lambda: vehicle.rule in ("landed", "lost"), 60.0, "landing after an abort")
+            done.append("landed")
+        elif vehicle.phase == Phase.IDLE and vehicle.is_flying():
+            vehicle.command = Command(Request.IDLE)
+            vehicle.land(0.0, 4.0)
+            vehicle.wait(lambda: not vehicle.is_flying(), 20.0, "landing", 0.5)
+            done.append("landed")
+        vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
+    finally:
+        if not vehicle.session.cf.lost:
+            vehicle.arm(False)
+            done.append("disarmed")
+    return ", ".join(done)
+
+
+def safe_or_why(vehicle: Vehicle) -> str:
+    """`make_safe`, with a failure told as text: for the end of a run, which must go on."""
+    try:
+        return make_safe(vehicle)
+    except (LinkError, RolloutError) as error:
+        return f"not confirmed: {error}"

@@ -1,0 +1,185 @@
+"""Checks before a flight: what was found, what is allowed, and what to do about it.
+
+Each check is a function of a vehicle; one that cannot be made because the vehicle lacks what it looks at fails, and
+says so. A check never changes what the vehicle does.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from ivl import native
+from ivl.experiment import Experiment
+from ivl.links.packets import Phase
+from ivl.links.vehicle import Supervisor, Vehicle
+
+PINGS_MIN, LOST_MAX, P95_S_MAX = 10, 0.1, 0.1
+BATTERY_V_MIN, BATTERY_S = 3.7, 2.0
+SIGMA_M_MAX, SIGMA_S = 0.1, 10.0
+_LINK_S, _PING_S = 3.0, 0.02
+_TYPES = {"f4": "<f", "u1": "<B", "u2": "<H", "u4": "<L"}
+_CONTROLLER_APP = 6
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the table.
+
+    Attributes:
+        name: What was looked at.
+        ok: Whether it is as it must be.
+        found: What was found.
+        needed: What is allowed.
+        remedy: What to do if it is not.
+    """
+
+    name: str
+    ok: bool
+    found: str
+    needed: str
+    remedy: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {"name": self.name, "ok": self.ok, "found": self.found, "needed": self.needed, "remedy": self.remedy}
+
+
+def checks(vehicle: Vehicle, experiment: Experiment | None = None) -> Iterator[Check]:
+    """Make the checks one by one, those of an experiment's ranges and configuration if it is given.
+
+    Raises:
+        LinkError: The link broke on the way.
+        RolloutError: The vehicle refuses the configuration.
+    """
+    for check in (tables, link, supervisor, controller, bypass, tumble_check, battery, estimator, phase):
+        yield check(vehicle)
+    if experiment is not None:
+        yield policy_range(vehicle, experiment)
+        yield configuration(vehicle, experiment)
+
+
+def failures(found: list[Check]) -> str:
+    """The checks that failed, in one line; empty if none did."""
+    return "; ".join(f"{c.name}: {c.found} (needed: {c.needed}): {c.remedy}" for c in found if not c.ok)
+
+
+def tables(vehicle: Vehicle) -> Check:
+    """Every parameter and log variable of the flight core, with the type that this host expects."""
+    session = vehicle.session
+    params, _ = native.library().layout(native.LAYOUT_CONFIG)
+    logs, _ = native.library().layout(native.LAYOUT_LOGS)
+    wrong = [n for n, f in params.items() if not session.has_param(n) or session.param_type(n) != _TYPES[f.type]]
+    wrong += [n for n, f in logs.items() if not session.has_log(n) or session.log_type(n) != _TYPES[f.type]]
+    found = f"{len(wrong)} differ, the first {wrong[0]}" if wrong else "all as expected"
+    return Check(
+        "tables", not wrong, found, f"{len(params)} parameters and {len(logs)} log variables of this version",
+        "flash the firmware of this version (ivl flash), or use the host of that firmware",
+    )  # fmt: skip
+
+
+def link(vehicle: Vehicle) -> Check:
+    """Pings of the last seconds."""
+    session = vehicle.session
+    usual_s, session.ping_s = session.ping_s, _PING_S
+    vehicle.wait_in_wall_time(lambda: session.quality().sent >= PINGS_MIN, _LINK_S)
+    session.ping_s = usual_s
+    quality = session.quality()
+    lost = quality.lost / quality.sent if quality.sent else 1.0
+    ok = quality.sent >= PINGS_MIN and lost <= LOST_MAX and quality.p95_s <= P95_S_MAX
+    return Check(
+        "link", ok, f"{100 * lost:.0f} % of {quality.sent} pings lost, 95 % within {1e3 * quality.p95_s:.1f} ms",
+        f"at most {100 * LOST_MAX:.0f} % lost, {1e3 * P95_S_MAX:.0f} ms",
+        "bring the antenna nearer, choose another channel, stop other traffic",
+    )  # fmt: skip
+
+
+def supervisor(vehicle: Vehicle) -> Check:
+    """State bits."""
+    bits = vehicle.supervisor()
+    bad = bits & (Supervisor.LOCKED | Supervisor.CRASHED | Supervisor.TUMBLED)
+    ok = not bad and bool(bits & (Supervisor.ARMED | Supervisor.CAN_BE_ARMED))
+    names = ", ".join(str(bit.name).lower().replace("_", " ") for bit in Supervisor if bit in bits) or "nothing set"
+    remedy = "set the vehicle upright and level, wait for its self-test"
+    if Supervisor.LOCKED in bits:
+        remedy = "switch the vehicle off and on again"
+    elif Supervisor.CRASHED in bits:
+        remedy = "set it upright; the next flight asks for recovery"
+    return Check("supervisor", ok, names, "can be armed; not locked, crashed or tumbled", remedy)
+
+
+def controller(vehicle: Vehicle) -> Check:
+    """The app must have the motors."""
+    return _param(vehicle, "stabilizer.controller", _CONTROLLER_APP, "write stabilizer.controller 6, or flash the app")
+
+
+def bypass(vehicle: Vehicle) -> Check:
+    """Nobody may drive the motors past the controller."""
+    return _param(vehicle, "motorPowerSet.enable", 0, "write motorPowerSet.enable 0")
+
+
+def tumble_check(vehicle: Vehicle) -> Check:
+    """On, outside of flips."""
+    return _param(vehicle, "supervisor.tmblChckEn", 1, "restart the vehicle; if it stays, the app does not run")
+
+
+def battery(vehicle: Vehicle) -> Check:
+    """Rest voltage."""
+    vehicle.wait_in_wall_time(lambda: vehicle.battery_V > 0.0, BATTERY_S)
+    return Check(
+        "battery", vehicle.battery_V >= BATTERY_V_MIN, f"{vehicle.battery_V:.2f} V", f"{BATTERY_V_MIN:.2f} V or more",
+        "charge or change the battery",
+    )  # fmt: skip
+
+
+def estimator(vehicle: Vehicle) -> Check:
+    """Certainty of the position, within a time-out."""
+    vehicle.wait_in_wall_time(lambda: vehicle.position_sigma_m <= SIGMA_M_MAX, SIGMA_S)
+    sigma_m = vehicle.position_sigma_m
+    return Check(
+        "estimator", sigma_m <= SIGMA_M_MAX, "unknown" if math.isnan(sigma_m) else f"{1e3 * sigma_m:.1f} mm",
+        f"at most {1e3 * SIGMA_M_MAX:.0f} mm within {SIGMA_S:.0f} s",
+        "check motion capture: body seen, streamed, stabilizer.estimator 2; write kalman.resetEstimation 1",
+    )  # fmt: skip
+
+
+def phase(vehicle: Vehicle) -> Check:
+    """Nobody flies it."""
+    resting = vehicle.phase in (Phase.IDLE, Phase.ATTACHED, Phase.DONE, Phase.ABORTED)
+    return Check(
+        "phase", resting, vehicle.phase.name.lower(), "idle, or a landing that is over",
+        "another host flies this vehicle: stop it",
+    )  # fmt: skip
+
+
+def policy_range(vehicle: Vehicle, experiment: Experiment) -> Check:
+    """The bounds of the search lie within what the vehicle will accept."""
+    record, _ = experiment.make_world().native_model.config()
+    limits = (float(record["ivl.rrev_c_max"][0]), 1e3 * float(record["ivl.moment_y_max"][0]))
+    bounds = (experiment.policy.rrev_c_per_s.bounds, experiment.policy.moment_y_Nmm.bounds)
+    del vehicle
+    ok = all(lo >= 0.0 and hi <= limit for (lo, hi), limit in zip(bounds, limits, strict=True))
+    found = f"RREV_c {bounds[0][0]:g} .. {bounds[0][1]:g} 1/s, M_yd {bounds[1][0]:g} .. {bounds[1][1]:g} N mm"
+    return Check(
+        "policy bounds", ok, found, f"within 0 .. {limits[0]:g} 1/s and 0 .. {limits[1]:g} N mm",
+        "change policy.*.bounds of the experiment, or firmware.rrev_c_max and firmware.moment_y_max",
+    )  # fmt: skip
+
+
+def configuration(vehicle: Vehicle, experiment: Experiment) -> Check:
+    """The configuration that is in force."""
+    _, crc = experiment.make_world().native_model.config()
+    vehicle.wait_in_wall_time(lambda: "ivl.cfg_crc" in vehicle.config.values, BATTERY_S)
+    found = int(vehicle.config.values.get("ivl.cfg_crc", 0))
+    return Check(
+        "configuration", found == crc, f"CRC {found:08x}", f"CRC {crc:08x} of {experiment.name}",
+        "send it: ivl doctor --send, ivl fly or ivl learn with this experiment",
+    )  # fmt: skip
+
+
+def _param(vehicle: Vehicle, name: str, wanted: int, remedy: str) -> Check:
+    session = vehicle.session
+    if not session.has_param(name):
+        return Check(name, False, "no such parameter", str(wanted), "flash a firmware that has it")
+    value = session.read([name])[name]
+    return Check(name, value == wanted, f"{value:g}", str(wanted), remedy)

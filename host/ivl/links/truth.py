@@ -1,0 +1,101 @@
+"""The outcome of a landing that was flown in a room: from the flight recorder, the resting pose and a person."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ivl import native
+from ivl.links.packets import Phase, Recording
+from ivl.links.vehicle import Snapshot
+from ivl.world import World
+
+_TILT_DEG_MAX, _GAP_M_MAX = 25.0, 0.02
+
+
+@dataclass(frozen=True)
+class Resting:
+    """Where the vehicle came to rest.
+
+    Attributes:
+        height_m: Of the body origin, in W.
+        up_z: Component of the body's z axis along W z: 1 upright, -1 hanging.
+    """
+
+    height_m: float
+    up_z: float
+
+
+def hanging_gap_m(world: World) -> float:
+    """Distance of the body origin from the ceiling's surface when it hangs on four legs at their rest angle, m."""
+    p = world.params.values
+    return p["leg.length"] * math.cos(math.radians(p["leg.angle"])) + p["leg.foot_radius"] - p["leg.hip_z"]
+
+
+def suggest_legs(resting: Resting, world: World) -> int:
+    """Legs that hold, as far as height and tilt tell: 4, 2 (hangs, but tilted or low), or 0 (not at the ceiling)."""
+    gap_m = world.params.values["world.ceiling_height"] - resting.height_m
+    tilt_deg = math.degrees(math.acos(min(max(-resting.up_z, -1.0), 1.0)))
+    level = tilt_deg <= _TILT_DEG_MAX and abs(gap_m - hanging_gap_m(world)) <= _GAP_M_MAX
+    reach_m = world.derived()["reach_m"] + _GAP_M_MAX
+    return 4 if level else (2 if gap_m <= reach_m else 0)
+
+
+def outcome_of_flight(
+    recording: Recording, snapshot: Snapshot, n_legs: int, body_contact: bool, resting: Resting, world: World
+) -> np.ndarray[Any, np.dtype[np.void]]:
+    """An outcome record, shape (1,), in the library's layout.
+
+    Times count from the recorder's first row. What a room cannot know (the order of the legs, steps of an integrator)
+    stays 0, and numbers of a contact that was not seen stay NaN.
+    """
+    outcome = np.zeros(1, dtype=native.library().outcome_dtype)
+    for name in outcome.dtype.names or ():
+        if outcome.dtype[name].kind == "f":
+            outcome[name] = np.nan
+    rows = recording.rows
+    gap_m = world.params.values["world.ceiling_height"] - np.append(rows["p_W_m"][:, 2], resting.height_m)
+    outcome["n_legs"], outcome["body_contact"] = n_legs, body_contact
+    outcome["d_min_m"] = np.min(gap_m)
+    outcome["n_ticks"] = len(rows)
+    outcome["t_end_s"] = rows["t_s"][-1] if len(rows) else 0.0
+    impact = _impact_row(recording, world)
+    outcome["end_reason"] = _end_code("contact_time" if impact is not None or n_legs else "missed")
+    if recording.trigger_row is not None:
+        _fill(outcome, rows, recording.trigger_row, "trigger")
+        outcome["triggered"] = 1
+        outcome["d_trigger_m"], outcome["rrev_trigger"] = snapshot.d_ceil_m, snapshot.rrev_per_s
+        outcome["of_y_trigger"] = snapshot.of_y_radps
+    if impact is not None:
+        _fill(outcome, rows, impact, "impact")
+        outcome["theta_impact_deg"] = pitch_deg(rows["q_WB"])[impact]
+    return outcome
+
+
+def pitch_deg(q_WB: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Nose-up rotation about b_y, unwrapped along the rows, degrees; q_WB has shape (n, 4), x y z w."""
+    x, y, z, w = q_WB.T
+    return np.asarray(np.degrees(np.unwrap(np.arctan2(2.0 * (x * z - w * y), 1.0 - 2.0 * (y * y + z * z)))))
+
+
+def _impact_row(recording: Recording, world: World) -> int | None:
+    """First row after the trigger with a specific force that no flip makes, or in which the core felt a contact."""
+    if recording.trigger_row is None:
+        return None
+    record, _ = world.native_model.config()
+    force_mps2 = np.linalg.norm(recording.rows["f_B_mps2"], axis=1)
+    touched = (force_mps2 > float(record["ivl.contact_accel"][0])) | (recording.rows["phase"] == Phase.ATTACHED)
+    touched[: recording.trigger_row + 1] = False
+    return int(np.argmax(touched)) if touched.any() else None
+
+
+def _fill(outcome: np.ndarray[Any, Any], rows: np.ndarray[Any, Any], row: int, when: str) -> None:
+    outcome[f"t_{when}_s"] = rows["t_s"][row]
+    outcome[f"vx_{when}_mps"], outcome[f"vz_{when}_mps"] = rows["v_W_mps"][row, 0], rows["v_W_mps"][row, 2]
+    outcome[f"rate_{when}_radps"] = -rows["w_B_radps"][row, 1]
+
+
+def _end_code(name: str) -> int:
+    library = native.library()
+    return next(i for i in range(int(library.outcome_fields["end_reason"].hi) + 1) if library.end_reason(i) == name)

@@ -1,0 +1,389 @@
+"""A vehicle with the app of this project, over any link: configuration, policy, commands, supervisor, recorder.
+
+Whatever is put in force is confirmed by the vehicle itself before a call returns. Time is that of `clock`; each wait
+repeats the present command ten times a second and more, which is the vehicle's proof that its host lives.
+"""
+
+import secrets
+import struct
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+
+from ivl import native
+from ivl.errors import LinkError, RolloutError
+from ivl.links.clock import Clock, WallClock
+from ivl.links.packets import (
+    STATUS_TEXT,
+    Packet,
+    PacketType,
+    Phase,
+    Recording,
+    Request,
+    Status,
+    decode,
+    encode,
+    record_header,
+    record_rows,
+)
+from ivl.links.tables import LogBlock, Session
+from ivl.world import World
+
+HEARTBEAT_S = 0.08
+"""Vehicle time between two commands: 12.5 Hz; the vehicle aborts after `host_s_max`, 0.5 s."""
+MEMORY_RECORDER = 0x18
+_PORT_SUPERVISOR, _PORT_HL, _PORT_PLATFORM, _APP = 9, 8, 13, 2
+_ECHO_S, _ECHO_POLL_S = 2.0, 0.01
+_RECORDER_TRIES = 3
+_WALL_POLL_S = 0.005
+
+
+class Supervisor(IntFlag):
+    """Bits that the vehicle's supervisor tells."""
+
+    CAN_BE_ARMED = 1 << 0
+    ARMED = 1 << 1
+    AUTO_ARM = 1 << 2
+    CAN_FLY = 1 << 3
+    FLYING = 1 << 4
+    TUMBLED = 1 << 5
+    LOCKED = 1 << 6
+    CRASHED = 1 << 7
+
+
+class PolicyRefused(RolloutError):
+    """The vehicle refused a policy for its values; flying it again would not help."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """What the vehicle is asked to do, again and again.
+
+    Attributes:
+        request: What.
+        hover_W_m: Where to hover; used by HOVER.
+        speed_mps: Approach speed; used by APPROACH.
+        angle_rad: Approach angle above the horizontal; used by APPROACH.
+    """
+
+    request: Request
+    hover_W_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    speed_mps: float = 0.0
+    angle_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What the vehicle latched at its last trigger."""
+
+    policy_seq: int
+    d_ceil_m: float
+    rrev_per_s: float
+    of_y_radps: float
+    vx_mps: float
+    vz_mps: float
+
+
+class Vehicle:
+    """A connected vehicle. `watch`, `state` and `trigger` are its log blocks, running from the start."""
+
+    def __init__(self, session: Session, clock: Clock | None = None) -> None:
+        """Start the log blocks; `clock` is the wall clock unless given.
+
+        Raises:
+            LinkError: The firmware is another, or the link is gone.
+        """
+        self.session, self.clock = session, clock or WallClock()
+        self.command = Command(Request.IDLE)
+        self._seq = secrets.randbits(16)
+        self._policy_seq = secrets.randbits(31)
+        self._echo: dict[PacketType, Packet] = {}
+        self.watch = LogBlock(
+            ("ivl.phase", "ivl.rule", "ivl.cause", "ivl.policy_seq", "ivl.trg_seq", "pm.vbat", "supervisor.info"), 20
+        )
+        self.state = LogBlock(
+            ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "kalman.varPX", "kalman.varPY", "kalman.varPZ"),
+            50,
+        )
+        self.trigger = LogBlock(
+            ("ivl.trg_seq", "ivl.trg_d", "ivl.trg_rrev", "ivl.trg_of_y", "ivl.trg_vx", "ivl.trg_vz"), 50
+        )
+        self.config = LogBlock(("ivl.cfg_seq", "ivl.cfg_status", "ivl.cfg_bad", "ivl.cfg_crc"), 100)
+        session.listen(_PORT_PLATFORM, _APP, self._on_app)
+        for block in (self.watch, self.state, self.trigger, self.config):
+            session.start_log(block)
+
+    def _on_app(self, data: bytes) -> None:
+        packet = decode(data)
+        if packet is None or (packet.type == PacketType.COMMAND_ECHO and self._is_late(packet)):
+            return
+        self._echo[packet.type] = packet
+
+    def _is_late(self, packet: Packet) -> bool:
+        """Whether a later command has been answered before."""
+        last = self._echo.get(PacketType.COMMAND_ECHO)
+        return last is not None and _is_before(int(packet["seq"]), int(last["seq"]))
+
+    # ---- time
+
+    def pause(self, span_s: float) -> None:
+        """Let vehicle time pass, with heartbeats."""
+        left_s = span_s
+        while left_s > 0.0:
+            self.send_command()
+            step_s = min(left_s, HEARTBEAT_S)
+            self.clock.pause(step_s)
+            left_s -= step_s
+
+    def wait(self, condition: Callable[[], bool], limit_s: float, what: str, step_s: float = HEARTBEAT_S) -> None:
+        """Let time pass until a condition holds.
+
+        Raises:
+            RolloutError: It did not within `limit_s` of vehicle time.
+            LinkError: The vehicle fell silent.
+        """
+        end_s = self.clock.now_s() + limit_s
+        while not condition():
+            if self.clock.now_s() >= end_s:
+                raise RolloutError(f"{what}: not within {limit_s:g} s ({self.describe()})")
+            self.pause(step_s)
+            if self.session.silence_s > self.session.deadlines.answer_s:
+                raise LinkError(f"{self.session.uri}: nothing was heard for {self.session.silence_s:.1f} s")
+
+    def wait_in_wall_time(self, condition: Callable[[], bool], limit_s: float) -> bool:
+        """Let time pass until a condition holds; returns whether it does after `limit_s` at the latest."""
+        end_s = time.monotonic() + limit_s
+        while not (found := condition()) and time.monotonic() < end_s:
+            self.clock.pause(_ECHO_POLL_S)
+            time.sleep(_WALL_POLL_S)
+        return found
+
+    # ---- commands
+
+    def send_command(self) -> int:
+        """Send the present command once; returns its number."""
+        self._seq = (self._seq + 1) % 0x10000
+        c = self.command
+        data = encode(
+            PacketType.COMMAND, seq=self._seq, request=c.request, hover_x_m=c.hover_W_m[0], hover_y_m=c.hover_W_m[1],
+            hover_z_m=c.hover_W_m[2], speed_mps=c.speed_mps, angle_rad=c.angle_rad,
+        )  # fmt: skip
+        self.session.send(_PORT_PLATFORM, _APP, data)
+        return self._seq
+
+    def ask_for(self, command: Command, phases: tuple[Phase, ...], limit_s: float) -> Phase:
+        """Put a command in force and wait until the vehicle is in one of the phases.
+
+        Raises:
+            RolloutError: The vehicle refuses, or does something else; the message has its rule.
+        """
+        self.command = command
+        first = self.send_command()
+        self.wait(lambda: self._has_answered(first, phases), limit_s, f"request {command.request.name}", _ECHO_POLL_S)
+        return self.phase
+
+    def _has_answered(self, first: int, phases: tuple[Phase, ...]) -> bool:
+        echo = self._echo.get(PacketType.COMMAND_ECHO)
+        if echo is None or _is_before(int(echo["seq"]), first):
+            return False
+        if echo["status"] == Status.RANGE:
+            raise RolloutError(f"request {self.command.request.name}: {STATUS_TEXT[Status.RANGE]}: {self.command}")
+        return self.phase in phases
+
+    @property
+    def phase(self) -> Phase:
+        """Phase that the last answered command led to; from the log before one was answered."""
+        echo = self._echo.get(PacketType.COMMAND_ECHO)
+        return Phase(int(echo["phase"] if echo is not None else self.watch.values.get("ivl.phase", 0)))
+
+    @property
+    def rule(self) -> str:
+        """Name of the safety rule that holds, "none" if none does."""
+        return self._rule_name("rule")
+
+    @property
+    def cause(self) -> str:
+        """Name of the safety rule that last ended a phase of this cycle, "none" if none did."""
+        return self._rule_name("cause")
+
+    def _rule_name(self, member: str) -> str:
+        echo = self._echo.get(PacketType.COMMAND_ECHO)
+        code = echo[member] if echo is not None else self.watch.values.get(f"ivl.{member}", 0)
+        return native.library().rule_name(int(code))
+
+    def describe(self) -> str:
+        """Phase, rule and cause in words."""
+        echo = self._echo.get(PacketType.COMMAND_ECHO)
+        if echo is None:
+            return "no command was answered"
+        text = f"phase {Phase(int(echo['phase'])).name}"
+        text += f", {STATUS_TEXT[Status(int(echo['status']))]}" if echo["status"] else ""
+        text += f", rule {self.rule}" if echo["rule"] else ""
+        return text + (f", cause {self.cause}" if echo["cause"] else "")
+
+    # ---- configuration
+
+    def configure(self, world: World) -> int:
+        """Write what differs from the world's configuration, put it in force, and return its CRC as confirmed.
+
+        Raises:
+            RolloutError: The vehicle refused a value, or has something else in force.
+        """
+        record, crc = world.native_model.config()
+        fields, _ = native.library().layout(native.LAYOUT_CONFIG)
+        wanted = {name: record[0][name].item() for name in fields}
+        present = self.session.read(wanted)
+        self.session.write({name: value for name, value in wanted.items() if not _same(present[name], value)})
+        seq = secrets.randbits(31) + 1
+        self.session.write({"ivl.commit": seq})
+        self.wait(lambda: self._config_answer(seq) is not None, _ECHO_S, "configuration", _ECHO_POLL_S)
+        status, bad, found = self._config_answer(seq) or (Status.PHASE, 255, 0)
+        if status != Status.OK:
+            name = list(fields)[bad] if bad < len(fields) else ""
+            what = f"{name}: value {wanted[name]:g}: " if name else ""
+            raise RolloutError(f"configuration: {what}the vehicle refused it: {STATUS_TEXT[Status(status)]}")
+        if found != crc:
+            raise RolloutError(f"configuration: the vehicle has CRC {found:08x} in force, not {crc:08x}")
+        return crc
+
+    def _config_answer(self, seq: int) -> tuple[int, int, int] | None:
+        """Status, refused row and CRC that answer a commit, from the packet or from the log, whichever came through."""
+        echo, log = self._echo.get(PacketType.CONFIG_ECHO), self.config.values
+        if echo is not None and echo["seq"] == seq:
+            return int(echo["status"]), int(echo["bad"]), int(echo["crc"])
+        if log.get("ivl.cfg_seq") == seq:
+            return int(log["ivl.cfg_status"]), int(log["ivl.cfg_bad"]), int(log["ivl.cfg_crc"])
+        return None
+
+    # ---- policy
+
+    def put_policy(self, rrev_c_per_s: float, moment_y_Nmm: float) -> int:
+        """Put a policy in force and return its number, once the vehicle has said that this one is.
+
+        Raises:
+            PolicyRefused: It is out of the vehicle's range.
+            RolloutError: It was not confirmed.
+        """
+        self._policy_seq = self._policy_seq % 0xFFFF_FFFE + 1
+        wanted = (self._policy_seq, float(np.float32(rrev_c_per_s)), float(np.float32(moment_y_Nmm * 1e-3)))
+        data = encode(PacketType.POLICY, seq=wanted[0], rrev_c_per_s=wanted[1], moment_y_Nm=wanted[2])
+        end_s = self.clock.now_s() + _ECHO_S
+        while (echo := self._policy_echo()) is None:
+            if self.clock.now_s() >= end_s:
+                raise RolloutError(f"policy {self._policy_seq}: not confirmed within {_ECHO_S:g} s")
+            self.session.send(_PORT_PLATFORM, _APP, data)
+            self.pause(2 * _ECHO_POLL_S)
+        status = Status(int(echo["status"]))
+        what = f"policy RREV_c {rrev_c_per_s:g} 1/s, M_yd {moment_y_Nmm:g} N mm"
+        if status == Status.RANGE:
+            raise PolicyRefused(f"{what}: the vehicle refused it: {STATUS_TEXT[status]}")
+        found = (echo["seq_in_force"], echo["rrev_c_per_s"], echo["moment_y_Nm"])
+        if status != Status.OK or found != wanted:
+            raise RolloutError(f"{what}: not in force: {STATUS_TEXT[status]}, the vehicle has {found}")
+        return self._policy_seq
+
+    def _policy_echo(self) -> Packet | None:
+        echo = self._echo.get(PacketType.POLICY_ECHO)
+        return echo if echo is not None and echo["seq"] == self._policy_seq else None
+
+    # ---- supervisor and high-level commander
+
+    def supervisor(self) -> Supervisor:
+        """The supervisor's bits, asked for now."""
+        answer = self.session.ask(_PORT_SUPERVISOR, 0, b"\x0c", b"\x8c", "state of the supervisor")
+        return Supervisor(int.from_bytes(answer[1:3], "little") & 0xFF)
+
+    def is_flying(self) -> bool:
+        """Whether the supervisor believes that it flies."""
+        return Supervisor.FLYING in self.supervisor()
+
+    def arm(self, do: bool) -> bool:
+        """Arm or disarm; returns whether the vehicle is armed afterwards."""
+        answer = self.session.ask(_PORT_SUPERVISOR, 1, bytes((1, do)), b"\x81", "arming" if do else "disarming")
+        return len(answer) > 2 and bool(answer[2])
+
+    def recover(self) -> bool:
+        """Ask to forget a crash; returns whether it is forgotten (only upright)."""
+        answer = self.session.ask(_PORT_SUPERVISOR, 1, b"\x02", b"\x82", "recovery from a crash")
+        return len(answer) > 2 and bool(answer[2])
+
+    def take_off(self, height_m: float, duration_s: float) -> None:
+        """Climb to a height, by the high-level commander; returns when the vehicle has taken the order."""
+        self._high_level(struct.pack("<BBff?f", 7, 0, height_m, 0.0, True, duration_s), "take-off")
+
+    def go_to(self, position_W_m: tuple[float, float, float], duration_s: float) -> None:
+        """Fly to a point, by the high-level commander."""
+        self._high_level(
+            struct.pack("<BBBBfffff", 12, 0, 0, 0, *position_W_m, 0.0, duration_s), "go to the start point"
+        )
+
+    def land(self, height_m: float, duration_s: float) -> None:
+        """Descend, by the high-level commander."""
+        self._high_level(struct.pack("<BBff?f", 8, 0, height_m, 0.0, True, duration_s), "landing")
+
+    def _high_level(self, data: bytes, what: str) -> None:
+        answer = self.session.ask(_PORT_HL, 0, data, data[:1], what)
+        error = answer[3] if len(answer) > 3 else 0xFF
+        if error != 0:
+            raise RolloutError(f"{what}: the vehicle refused it (error {error}; {self.supervisor()!r})")
+
+    # ---- what it tells
+
+    @property
+    def battery_V(self) -> float:
+        """Voltage of the battery, NaN if it is not known yet."""
+        return float(self.watch.values.get("pm.vbat", float("nan")))
+
+    @property
+    def position_W_m(self) -> tuple[float, float, float]:
+        """Estimated position, NaN if it is not known yet."""
+        x, y, z = (float(self.state.values.get(f"stateEstimate.{axis}", float("nan"))) for axis in "xyz")
+        return x, y, z
+
+    @property
+    def position_sigma_m(self) -> float:
+        """Standard deviation of the estimate, of the worst axis; NaN if it is not known yet."""
+        names = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")
+        return float(np.sqrt(max(self.state.values.get(name, float("nan")) for name in names)))
+
+    def snapshot(self) -> Snapshot:
+        """What was latched at the last trigger."""
+        names = ("ivl.trg_seq", "ivl.trg_d", "ivl.trg_rrev", "ivl.trg_of_y", "ivl.trg_vx", "ivl.trg_vz")
+        seq, *rest = (self.trigger.values.get(name, float("nan")) for name in names)
+        return Snapshot(int(seq), *(float(value) for value in rest))
+
+    def recording(self, policy_seq: int) -> Recording:
+        """Download the flight recorder of the landing that flew a policy.
+
+        Raises:
+            LinkError: There is no recorder, it is still recording, or it holds another landing.
+        """
+        number = self.session.memory(MEMORY_RECORDER)
+        if number is None:
+            raise LinkError(f"{self.session.uri}: the vehicle has no flight recorder (memory 0x18)")
+        size = native.library().layout(native.LAYOUT_RECORD_HEADER)[1].itemsize
+        row_size = native.library().layout(native.LAYOUT_RECORD_ROW)[1].itemsize
+        for _ in range(_RECORDER_TRIES):
+            head = self.session.read_memory(number, 0, size, "flight recorder: header")
+            header = record_header(head)
+            if not header["frozen"]:
+                raise LinkError("flight recorder: it is still recording")
+            if header["policy_seq"] not in (0, policy_seq):
+                raise LinkError(f"flight recorder: it holds policy {header['policy_seq']}, not {policy_seq}")
+            rows = self.session.read_memory(number, size, int(header["n_rows"]) * row_size, "flight recorder: rows")
+            if self.session.read_memory(number, 0, size, "flight recorder: header") == head:
+                return record_rows(header, rows)
+        raise LinkError("flight recorder: it kept changing while it was read")
+
+
+def _same(present: float, wanted: float) -> bool:
+    """Equal in every bit of single precision."""
+    return struct.pack("<f", present) == struct.pack("<f", wanted)
+
+
+def _is_before(seq: int, other: int) -> bool:
+    """Order of two numbers of 16 bits that wrap."""
+    return (seq - other) % 0x10000 >= 0x8000
