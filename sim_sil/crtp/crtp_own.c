@@ -1,0 +1,69 @@
+/// @file crtp_own.c
+/// The server's own parameters and log variables: time and link faults.  Beside those of the vehicle in the same tables.
+#include "crtp_server.h"
+
+#include <string.h>
+
+static const float SPEED_MAX = 1000.0f;
+
+static float clamped(float value, float lo, float hi, float otherwise)
+{
+    if (!(value >= lo) && !(value <= lo))
+    {
+        return otherwise;
+    }
+    return (value < lo) ? lo : ((value > hi) ? hi : value);
+}
+
+#define PARAM_TYPE_float    IVL_CF_PARAM_F32
+#define PARAM_TYPE_uint32_t IVL_CF_PARAM_U32
+#define FAULT_ROW(ctype, member, unit, lo, hi, doc)                                                                                        \
+    {.group = "fault", .name = #member, .type = PARAM_TYPE_##ctype, .address = &own->fault.member},
+
+size_t ivl_crtp_own_params(ivl_crtp_own_t *own, ivl_cf_param_t *rows)
+{
+    const ivl_cf_param_t own_rows[] = {
+        {.group = "sil", .name = "lockstep", .type = IVL_CF_PARAM_U8, .address = &own->time.lockstep},
+        {.group = "sil", .name = "speed_factor", .type = IVL_CF_PARAM_F32, .address = &own->time.speed_factor},
+        {.group = "sil", .name = "run_to_ms", .type = IVL_CF_PARAM_U32, .address = &own->time.run_to_ms},
+        {.group = "sil", .name = "run_until", .type = IVL_CF_PARAM_U16, .address = &own->time.run_until},
+        IVL_CRTP_FAULTS(FAULT_ROW) /* */
+        {.group = "fault", .name = "freeze_ms", .type = IVL_CF_PARAM_U32, .address = &own->freeze_ms},
+        {.group = "fault", .name = "cut_ms", .type = IVL_CF_PARAM_U32, .address = &own->cut_ms},
+    };
+    if (rows != NULL)
+    {
+        memcpy(rows, own_rows, sizeof own_rows);
+    }
+    return sizeof own_rows / sizeof own_rows[0];
+}
+
+size_t ivl_crtp_own_logs(ivl_crtp_own_t *own, ivl_cf_log_t *rows)
+{
+    const ivl_cf_log_t own_rows[] = {
+        {"sil", "n_rx", IVL_CF_LOG_U32, &own->n_rx},
+        {"sil", "n_tx", IVL_CF_LOG_U32, &own->n_tx},
+        {"sil", "n_bad", IVL_CF_LOG_U32, &own->n_bad},
+        {"sil", "n_foreign", IVL_CF_LOG_U32, &own->n_foreign},
+        {"sil", "n_slipped", IVL_CF_LOG_U32, &own->time.n_slipped},
+        {"fault", "n_lost", IVL_CF_LOG_U32, &own->n_lost},
+        {"fault", "n_duplicated", IVL_CF_LOG_U32, &own->n_duplicated},
+        {"fault", "n_reordered", IVL_CF_LOG_U32, &own->n_reordered},
+    };
+    if (rows != NULL)
+    {
+        memcpy(rows, own_rows, sizeof own_rows);
+    }
+    return sizeof own_rows / sizeof own_rows[0];
+}
+
+// what is out of range becomes the nearest allowed value, what is no number becomes harmless
+#define CLAMP_float(member, lo, hi)                 own->fault.member = clamped(own->fault.member, lo, hi, 0.0f);
+#define CLAMP_uint32_t(member, lo, hi)              /* any number is a seed */
+#define CLAMP_ROW(ctype, member, unit, lo, hi, doc) CLAMP_##ctype(member, lo, hi)
+
+void ivl_crtp_own_clamp(ivl_crtp_own_t *own)
+{
+    IVL_CRTP_FAULTS(CLAMP_ROW)
+    own->time.speed_factor = clamped(own->time.speed_factor, 0.0f, SPEED_MAX, 1.0f);
+}

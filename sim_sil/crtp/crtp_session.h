@@ -1,0 +1,39 @@
+/// @file crtp_session.h
+/// Whose vehicle it is.  The first to send something has it, until he is silent for a second or his socket is known to be gone; then the one
+/// who asked last gets it.  Pure: time and addresses are arguments.
+#ifndef IVL_CRTP_SESSION_H
+#define IVL_CRTP_SESSION_H
+#include "crtp_faults.h"
+
+#define IVL_CRTP_SILENCE_US 1000000u
+
+typedef struct
+{
+    bool                live;
+    uint64_t            peer, heard_us;
+    bool                is_waited_for;  ///< somebody else wants to connect; his request is kept
+    ivl_crtp_datagram_t waiting;
+} ivl_crtp_session_t;
+
+typedef enum
+{
+    IVL_CRTP_CLIENT,  ///< the one who has the vehicle
+    IVL_CRTP_NEW,     ///< has it from now on
+    IVL_CRTP_FOREIGN  ///< another one: his packet is passed over; but if it is the first of a connection (15/1), it waits for the client to go
+} ivl_crtp_who_t;
+
+/// The request with which a client begins.
+bool ivl_crtp_is_link_source(const ivl_crtp_datagram_t *datagram);
+
+/// A packet that says something has come.
+ivl_crtp_who_t ivl_crtp_session_hear(ivl_crtp_session_t *session, uint64_t now_us, const ivl_crtp_datagram_t *datagram);
+
+/// @return true if the client has just been given up for his silence
+bool ivl_crtp_session_expire(ivl_crtp_session_t *session, uint64_t now_us);
+
+/// Nobody listens at this address.  @return true if it was the client's, who is given up
+bool ivl_crtp_session_gone(ivl_crtp_session_t *session, uint64_t peer);
+
+/// The request of the one who waited, if the vehicle is free.
+bool ivl_crtp_session_next(ivl_crtp_session_t *session, ivl_crtp_datagram_t *datagram);
+#endif  // IVL_CRTP_SESSION_H
