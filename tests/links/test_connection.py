@@ -14,7 +14,7 @@ from ivl.links.connection import check_uri
 from ivl.links.deadlines import Deadlines
 from ivl.links.tables import LogBlock, Session
 
-SHORT = Deadlines(connect_s=5.0, answer_s=0.3, retry_s=0.05)
+SHORT = Deadlines(connect_s=10.0, answer_s=3.0, retry_s=0.05)
 PARAMS = {"ivl.mass": ("<f", 0.03), "ivl.cut": ("<B", 1), "sil.seed": ("<L", 5), "sil.speed": ("<d", 2.2)}
 
 
@@ -56,7 +56,7 @@ def test_connect_and_requests_survive_when_packets_are_lost_in_both_directions(
 ) -> None:
     vehicle.memories = {0x18: bytes(range(240))}
     vehicle.loss = loss
-    deadlines = Deadlines(connect_s=20.0, answer_s=5.0, retry_s=0.05)
+    deadlines = Deadlines(connect_s=30.0, answer_s=5.0, retry_s=0.05)
     with Session(vehicle.uri, deadlines) as session:
         for i in range(20):
             session.write({"sil.seed": i})
@@ -91,12 +91,12 @@ def test_error_is_raised_when_nobody_listens() -> None:
 
 
 def test_error_is_raised_in_time_when_the_vehicle_falls_silent(vehicle: FakeVehicle) -> None:
-    with Session(vehicle.uri, SHORT) as session:
+    with Session(vehicle.uri, Deadlines(connect_s=10.0, answer_s=0.3, retry_s=0.05)) as session:
         vehicle.muted = True
         with pytest.raises(LinkError, match=r"no answer within 0\.3 s: writing sil.seed"):
             session.write({"sil.seed": 1})
         vehicle.muted = False
-        session.write({"sil.seed": 2})
+        session.write({"sil.seed": 2}, deadline_s=3.0)
     assert vehicle.params["sil.seed"][1] == 2
 
 

@@ -7,7 +7,21 @@ import sys
 
 import typer
 
-from ivl.cli import bench, can_gateway, console, export, figs, flash, learn, listing, report, rollout, sweep
+from ivl.cli import (
+    bench,
+    can_gateway,
+    console,
+    doctor,
+    export,
+    figs,
+    flash,
+    fly,
+    learn,
+    listing,
+    report,
+    rollout,
+    sweep,
+)
 from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
 
 app = typer.Typer(
@@ -22,6 +36,8 @@ app.command("rollout", help=rollout.HELP)(rollout.rollout)
 app.command("list", help=listing.HELP)(listing.list_)
 app.command("bench", help=bench.HELP)(bench.bench)
 app.command("flash", help=flash.HELP)(flash.flash)
+app.command("doctor", help=doctor.HELP)(doctor.doctor)
+app.command("fly", help=fly.HELP)(fly.fly)
 app.command("can-gateway", help=can_gateway.HELP)(can_gateway.can_gateway)
 app.command("sweep", help=sweep.HELP)(sweep.sweep)
 app.command("map", help=sweep.MAP_HELP)(sweep.map_)

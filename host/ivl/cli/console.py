@@ -15,6 +15,11 @@ err = Console(stderr=True)
 UNITS = {"rrev_c_per_s": ("RREV_c", "1/s"), "moment_y_Nmm": ("M_yd", "N mm")}
 
 
+def say(text: str) -> None:
+    """One line for people, on stderr."""
+    err.print(text, highlight=False, markup=False, soft_wrap=True)
+
+
 def print_json(data: dict[str, Any]) -> None:
     """Print one JSON object on stdout, plain text whatever the terminal."""
     print(json.dumps(data, allow_nan=False))

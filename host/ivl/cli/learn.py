@@ -27,6 +27,10 @@ Examples:
       how often and how fast, over 100 seeds, for a script
   ivl learn experiments/paper_vertical.yaml --uri pil://
       every tick decided by an emulated STM32
+  ivl learn experiments/paper_vertical.yaml --uri udp://127.0.0.1:19850
+      the whole stack: a software vehicle, started with `ivl sil`, over the protocol of the drone
+  ivl learn experiments/paper_vertical.yaml --uri radio://0/80/2M/E7E7E7E7E7
+      the drone; see docs/HARDWARE.md first
   ivl learn --resume --out runs/mine
       go on after Ctrl-C, kill -9 or power loss
 """
@@ -47,7 +51,7 @@ def learn(
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was cut off.")] = False,
     uri: Annotated[
         str | None,
-        typer.Option(help="Where to fly: pil:// is the flight core on an emulated STM32; default: simulator."),
+        typer.Option(help="Where to fly: a vehicle's link, or pil:// (emulated STM32); default: simulator."),
     ] = None,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
@@ -55,7 +59,7 @@ def learn(
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], out, resume)
     folder = out or campaign.default_folder(chosen, n_trials, resume)
-    hooks = campaign.Hooks(on_start=_announce, on_episode=console.print_episode, on_stage=_stage)
+    hooks = campaign.Hooks(_announce, console.print_episode, _stage, console.say)
     try:
         result = campaign.run(chosen, folder, n_trials, resume, threads, hooks, uri)
     except KeyboardInterrupt:
