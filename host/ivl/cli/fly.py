@@ -1,0 +1,85 @@
+"""`ivl fly`."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from ivl import experiment, outcome
+from ivl.cli import console
+from ivl.errors import LinkError
+from ivl.reward import RewardOptions, paper
+
+HELP = """Fly one landing with a vehicle, and print what it latched at the trigger and how it ended.
+
+The approach is that of EXPERIMENT (default: the paper's vertical one). A drone takes off, flies to the start point and
+asks the operator for the outcome; a software vehicle is reset into the air and knows the outcome itself.
+
+\b
+Examples:
+  ivl fly --uri udp://127.0.0.1:19850 --rrev 4.8 --moment 8
+      one landing of the software vehicle (start it with: ivl sil)
+  ivl fly --uri udp://127.0.0.1:19850 --rrev 4.8 --moment 8 --rehearse
+      the same as if it were a drone: every question, take-off and all
+  ivl fly --uri radio://0/80/2M/E7E7E7E7E7 --rrev 4.8 --moment 8 --csv landing.csv
+      the drone; the flight recorder goes into landing.csv
+"""
+
+
+def fly(
+    uri: Annotated[str, typer.Option(help="Link of the vehicle: radio://, usb://, udp://, tcp:// or serial://.")],
+    rrev: Annotated[float, typer.Option("--rrev", "--rrev-c", help="Trigger threshold RREV_c, 1/s.")],
+    moment: Annotated[float, typer.Option(help="Flip moment M_yd, N mm (magnitude, nose up).")],
+    path: Annotated[
+        str, typer.Argument(metavar="[EXPERIMENT]", help="YAML file of the experiment.")
+    ] = "experiments/paper_vertical.yaml",
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="A.B=C", help="Change a field of the experiment.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers of a software vehicle.", min=0)] = 0,
+    stream: Annotated[int, typer.Option(help="Number of the rollout within the seed.", min=0)] = 0,
+    csv: Annotated[Path | None, typer.Option(help="Write the flight recorder into FILE.")] = None,
+    rehearse: Annotated[bool, typer.Option("--rehearse", help="Fly a software vehicle as a drone.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Fly one landing; HELP is the text that people see."""
+    chosen = experiment.load(path, settings or [])
+    try:
+        from ivl.links import crazyflie
+        from ivl.links.episode import Rollout
+    except ImportError as error:
+        raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
+    options = crazyflie.Options(rehearse=rehearse, keep_recordings=csv is not None, say=console.say)
+    with crazyflie.CrazyflieSource(uri, chosen, options) as source:
+        landing = source.fly_one(Rollout(rrev, moment, seed, stream))
+        end_reason = source.world.end_reason(int(landing.outcome["end_reason"][0]))
+    if csv is not None and landing.recording is not None:
+        csv.write_text(landing.recording.to_csv(), encoding="utf-8")
+    result = {"snapshot": _snapshot(landing), "outcome": _outcome(landing.outcome, end_reason)}
+    if as_json:
+        console.print_json(result)
+        return
+    for title, values in result.items():
+        console.out.print(title, style="bold")
+        for name, value in values.items():
+            text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
+            console.out.print(f"  {name:24s} {text}", highlight=False, soft_wrap=True)
+
+
+def _snapshot(landing: Any) -> dict[str, Any]:
+    """What the vehicle latched; None where this landing's trigger did not fire."""
+    snapshot = landing.snapshot
+    fired = snapshot.policy_seq == landing.policy_seq
+    names = ("d_ceil_m", "rrev_per_s", "of_y_radps", "vx_mps", "vz_mps")
+    values = {name: getattr(snapshot, name) if fired else None for name in names}
+    battery_V = landing.battery_V if np.isfinite(landing.battery_V) else None
+    return {"policy_seq": landing.policy_seq, "triggered": fired, **values, "battery_V": battery_V}
+
+
+def _outcome(record: Any, end_reason: str) -> dict[str, Any]:
+    result = outcome.as_dict(record[0], end_reason)
+    result["four_leg"] = bool(outcome.four_leg(record)[0])
+    result["clean"] = bool(outcome.clean(record)[0])
+    result["reward_paper"] = float(paper(record, RewardOptions()).total[0])
+    return result
