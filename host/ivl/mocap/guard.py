@@ -1,0 +1,56 @@
+"""What a loss of motion capture means for a flight."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from ivl.links.packets import Phase
+from ivl.mocap.watch import Status
+
+BEFORE_TRIGGER = frozenset((Phase.READY, Phase.APPROACH))
+IN_FLIP = frozenset((Phase.FLIP, Phase.COAST, Phase.ATTACHED))
+AGAIN_S = 0.05
+
+
+class Guard(Protocol):
+    """Told of the state of motion capture a hundred times a second, in its thread."""
+
+    def look(self, status: Status, text: str, now_s: float) -> None:
+        """Look, and return at once."""
+        ...
+
+
+class LossGuard:
+    """Before the trigger a loss asks for an abort, again and again while it lasts; later nothing is interrupted."""
+
+    def __init__(self, phase: Callable[[], int], abort: Callable[[str], None]) -> None:
+        """Watch over a flight.
+
+        Args:
+            phase: The flight core's phase as last heard.
+            abort: Asks the vehicle to abort, with the reason; called in the thread of motion capture. Repeating it must
+                change nothing, as with the request ABORT, which the flight core obeys before the trigger only.
+        """
+        self._phase, self._abort = phase, abort
+        self._t_next_s = float("-inf")
+        self._is_lost = False
+        self._has_asked = False
+        self.n_aborts = 0
+        """Losses for which an abort was asked."""
+        self.n_ignored = 0
+        """Losses that began in the flip."""
+        self.reason = ""
+        """Why an abort was asked last."""
+
+    def look(self, status: Status, text: str, now_s: float) -> None:
+        """Ask for an abort if it is time to."""
+        was_lost, self._is_lost = self._is_lost, status is not Status.GOOD
+        phase = self._phase()
+        if not self._is_lost:
+            self._has_asked = False
+        elif phase in BEFORE_TRIGGER and now_s >= self._t_next_s:
+            self._t_next_s = now_s + AGAIN_S
+            self.n_aborts += not self._has_asked
+            self._has_asked, self.reason = True, text
+            self._abort(text)
+        elif phase in IN_FLIP and not was_lost:
+            self.n_ignored += 1
