@@ -149,7 +149,11 @@ static void look_up(ivl_cf_t *cf)
     const double        up_z = ivl_rot_from_quat(kin.q_WB).row[2].z;
     const double        room_m = cf->model.raw.world_ceiling_height_m - kin.p_WB_m[2];
     const bool          seen = up_z > 0.5 && room_m >= 0.0 && room_m <= RANGE_M_MAX * up_z;
-    cf->range_up_mm = seen ? (uint16_t)(room_m / up_z * 1000.0 + 0.5) : RANGE_NONE_MM;
+    cf->range_up_mm = RANGE_NONE_MM;
+    if (seen)
+    {
+        cf->range_up_mm = (uint16_t)(room_m / up_z * 1000.0 + 0.5);
+    }
 }
 
 /// The estimator is as certain as its sensors are, and less and less without them.
