@@ -18,7 +18,7 @@ from ivl import native
 from ivl.errors import LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight, sil
-from ivl.links.clock import WallClock
+from ivl.links.clock import LockStep, WallClock
 from ivl.links.connection import check_uri
 from ivl.links.deadlines import DEADLINES, Deadlines
 from ivl.links.episode import Episode, Field, Landing, Rollout, safe_or_why, start_point
@@ -30,6 +30,7 @@ from ivl.outcome import Outcomes, valid
 from ivl.source import Flown, Plan
 
 ATTEMPTS_MAX = 10
+_SIL_CHECKS = ("tables", "link", "phase")
 _AGAIN_S = 0.2
 JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
 
@@ -160,22 +161,28 @@ class CrazyflieSource:
         session = Session(self.uri, self.options.deadlines)
         try:
             software = sil.is_sil(session)
-            vehicle = Vehicle(session, sil.lock_step(session) if software else WallClock())
+            vehicle = Vehicle(session, LockStep(session) if software else WallClock())
+            if software and self.options.rehearse:
+                sil.put_on_floor(vehicle)
             found = list(preflight.checks(vehicle))
             vehicle.configure(self.world)
-            if software and not self.options.rehearse:
-                self._field = SilField(vehicle, self._experiment, self.options.keep_recordings)
-                found = [check for check in found if check.name in ("tables", "link", "phase")]
-            else:
-                start_W_m = start_point(self.world, self._experiment)
-                self._field = Room(vehicle, self.world, start_W_m, self.options.operator or ConsoleOperator())
-                found.append(preflight.policy_range(vehicle, self._experiment))
+            self._field = self._make_field(vehicle, software)
+            if self._is_sil:  # the reset before each landing mends the rest
+                found = [check for check in found if check.name in _SIL_CHECKS]
+            found.append(preflight.policy_range(vehicle, self._experiment))
             if failed := preflight.failures(found):
                 raise RolloutError(f"{self.uri}: not fit to fly: {failed}")
         except BaseException:
             session.close()
             raise
         self._vehicle = vehicle
+
+    def _make_field(self, vehicle: Vehicle, software: bool) -> Field:
+        if software and not self.options.rehearse:
+            return SilField(vehicle, self._experiment, self.options.keep_recordings)
+        start_W_m = start_point(self.world, self._experiment)
+        operator = self.options.operator or ConsoleOperator()
+        return Room(vehicle, self.world, start_W_m, operator, place=sil.put_on_floor if software else None)
 
     def _return(self) -> None:
         """Connect again, for as long as a vehicle may stay away."""

@@ -32,7 +32,7 @@ class SilField:
     def to_start(self) -> Point:
         """Reset; the simulator puts the vehicle to the start of each landing itself."""
         self._vehicle.command = Command(Request.IDLE)
-        self.extras.reset()
+        sil.reset(self._vehicle)
         return self._vehicle.position_W_m
 
     def before_approach(self, rollout: Rollout) -> None:
@@ -77,16 +77,30 @@ class Room:
         operator: Operator,
         gate: Gate | None = None,
         resting: Callable[[Vehicle, Recording], Resting] | None = None,
+        place: Callable[[Vehicle], None] | None = None,
     ) -> None:
-        """`resting` tells where the vehicle is after a landing; default: its own estimate, fed by motion capture."""
+        """A room.
+
+        Args:
+            vehicle: A drone, or a software vehicle in a rehearsal.
+            world: What is flown, for the geometry of legs and ceiling.
+            start_W_m: Where the approach begins.
+            operator: Who places the vehicle and confirms outcomes.
+            gate: What must hold before each take-off.
+            resting: Tells where the vehicle is after a landing; default: its own estimate, fed by motion capture.
+            place: Does with a software vehicle what the operator's hands do with a drone.
+        """
         self._vehicle, self._world, self._start_W_m, self._operator = vehicle, world, start_W_m, operator
         self._gate = gate or Gate()
         self._resting = resting or resting_by_estimate
+        self._place = place
 
     def to_start(self) -> Point:
         """Ask the operator, arm, take off, fly to the start point."""
         vehicle = self._vehicle
         self._operator.place(self._start_W_m)
+        if self._place is not None:
+            self._place(vehicle)
         self._check_gate()
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         self._make_fit()

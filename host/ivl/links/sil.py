@@ -11,7 +11,6 @@ import numpy as np
 
 from ivl import native
 from ivl.errors import LinkError
-from ivl.links.clock import LockStep
 from ivl.links.packets import Phase, Request
 from ivl.links.tables import LogBlock, Session
 from ivl.links.vehicle import Command, Vehicle
@@ -22,6 +21,7 @@ _MAGIC = 0x4F4C5649
 _HEADER = "<4L"
 _AS_FLOWN = 255
 _RESET_S, _SEEN_S, _ENDED_S = 2.0, 0.06, 70.0
+_LAND_S, _LANDED_S = 3.0, 15.0
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,6 @@ class Sil:
         self._memory = number
         self._block = LogBlock(("sil.episode", "sil.ended"), 20)
         self._session.start_log(self._block)
-
-    def reset(self) -> None:
-        """Put the vehicle into the air at its start point, hovering and armed; returns when its logs show it there."""
-        self._session.write({"sil.reset": 1})
-        self._vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _RESET_S)
-        self._vehicle.pause(_SEEN_S)
 
     def prepare(self, spec: Spec) -> int:
         """Tell the start of the next approach; returns the number of the landing before it."""
@@ -109,14 +103,23 @@ class Sil:
             self._session.write({"sil.start": _AS_FLOWN})
 
 
+def reset(vehicle: Vehicle) -> None:
+    """Put a software vehicle into the air at its start point, hovering and armed; returns when its logs show that."""
+    vehicle.session.write({"sil.reset": 1})
+    vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _RESET_S)
+    vehicle.pause(_SEEN_S)
+
+
+def put_on_floor(vehicle: Vehicle) -> None:
+    """What a person does with a drone that hangs or lies somewhere: it stands upright on the floor, motors off."""
+    reset(vehicle)
+    vehicle.land(0.0, _LAND_S)
+    vehicle.wait(lambda: not vehicle.is_flying(), _LANDED_S, "landing", 0.2)
+
+
 def is_sil(session: Session) -> bool:
     """Whether the vehicle is a software vehicle."""
     return session.has_param("sil.reset")
-
-
-def lock_step(session: Session) -> LockStep:
-    """Take over the vehicle's time."""
-    return LockStep(session)
 
 
 def _halves(number: int) -> tuple[int, int]:
