@@ -206,15 +206,15 @@ IVL_SIM_INLINE void kinematics(const ivl_sim_model_t *model, const ivl_sim_state
     }
 }
 
-/// Angles of a hip's two hinges and the directions in which they move the rod.                    [MODEL eq. 3.2]
+/// A hip's two hinges: angles still to be unfolded, and the directions in which they move the rod.       [MODEL eq. 3.2]
 typedef struct
 {
-    ivl_wide_t alpha, beta;  ///< deflection in the leg's plane, and sideways
     ivl_w3_t   e_alpha, e_beta;
     ivl_wide_t inv_cos_beta;
 } hinge_t;
 
-IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n)
+/// @param[out] angle, t  of the deflections in the leg's plane and sideways, for ivl_wide_unfold
+IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n, ivl_angle_t angle[2], ivl_wide_t t_angle[2])
 {
     const ivl_d3_t   e1 = leg->rest_B[i], e2 = leg->inplane_B[i], e3 = leg->sideways_B[i];
     const ivl_wide_t c = ivl_w3_dot_d3(n, e1), s = ivl_w3_dot_d3(n, e2), t = ivl_w3_dot_d3(n, e3);
@@ -228,8 +228,10 @@ IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n)
     const ivl_wide_t  inv = both * reciprocal;
     const ivl_wide_t  ca = c * inv, sa = s * inv;
     hinge_t           h;
-    h.alpha = ivl_wide_unfold(&a, a.num * b.den * lever * reciprocal);
-    h.beta = ivl_wide_unfold(&b, b.num * a.den * lever * reciprocal);
+    angle[0] = a;
+    angle[1] = b;
+    t_angle[0] = a.num * b.den * lever * reciprocal;
+    t_angle[1] = b.num * a.den * lever * reciprocal;
     h.inv_cos_beta = inv;
     h.e_alpha = (ivl_w3_t){ca * e2.x - sa * e1.x, ca * e2.y - sa * e1.y, ca * e2.z - sa * e1.z};
     h.e_beta = (ivl_w3_t){root * e3.x - t * (ca * e1.x + sa * e2.x), root * e3.y - t * (ca * e1.y + sa * e2.y),
@@ -237,19 +239,31 @@ IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n)
     return h;
 }
 
-/// Force of a hip's springs and dampers on the foot; the rod's hip end gets the opposite, the body the opposite couple.
+/// Forces of the hips' springs and dampers on the feet; a rod's hip end gets the opposite, the body the opposite couple.
 /// [MODEL eq. 3.4]
-IVL_SIM_INLINE ivl_w3_t hip_couple(const ivl_sim_model_t *model, const kinematics_t *k, int i)
+IVL_SIM_INLINE void hip_couples(const ivl_sim_model_t *model, const kinematics_t *k, ivl_w3_t couple[IVL_SIM_LEGS])
 {
-    const double     stiffness = model->raw.leg_stiffness_Nmprad, damping = model->raw.leg_damping_Nmsprad;
-    const double     inv_length = 1.0 / model->raw.leg_length_m;
-    const hinge_t    h = hinge(&model->leg, i, k->n[i]);
-    const ivl_w3_t   turning = ivl_w3_sub(k->v_rod[i], ivl_w3_cross(k->w, k->rod[i]));
-    const ivl_wide_t alpha_rate = inv_length * ivl_w3_dot(turning, h.e_alpha) * h.inv_cos_beta;
-    const ivl_wide_t beta_rate = inv_length * ivl_w3_dot(turning, h.e_beta);
-    const ivl_wide_t torque_alpha = -(stiffness * h.alpha + damping * alpha_rate) * inv_length;
-    const ivl_wide_t torque_beta = -(stiffness * h.beta + damping * beta_rate) * inv_length;
-    return ivl_w3_plus(ivl_w3_scale(torque_alpha * h.inv_cos_beta, h.e_alpha), torque_beta, h.e_beta);
+    const double stiffness = model->raw.leg_stiffness_Nmprad, damping = model->raw.leg_damping_Nmsprad;
+    const double inv_length = 1.0 / model->raw.leg_length_m;
+    hinge_t      h[IVL_SIM_LEGS];
+    ivl_angle_t  folded[2 * IVL_SIM_LEGS];
+    ivl_wide_t   t[2 * IVL_SIM_LEGS], deflection[2 * IVL_SIM_LEGS];
+    IVL_SIM_UNROLL
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        h[i] = hinge(&model->leg, i, k->n[i], &folded[2 * i], &t[2 * i]);
+    }
+    ivl_wide_unfold(folded, t, deflection, 2 * IVL_SIM_LEGS);
+    IVL_SIM_UNROLL
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_w3_t   turning = ivl_w3_sub(k->v_rod[i], ivl_w3_cross(k->w, k->rod[i]));
+        const ivl_wide_t alpha_rate = inv_length * ivl_w3_dot(turning, h[i].e_alpha) * h[i].inv_cos_beta;
+        const ivl_wide_t beta_rate = inv_length * ivl_w3_dot(turning, h[i].e_beta);
+        const ivl_wide_t torque_alpha = -(stiffness * deflection[2 * i] + damping * alpha_rate) * inv_length;
+        const ivl_wide_t torque_beta = -(stiffness * deflection[2 * i + 1] + damping * beta_rate) * inv_length;
+        couple[i] = ivl_w3_plus(ivl_w3_scale(torque_alpha * h[i].inv_cos_beta, h[i].e_alpha), torque_beta, h[i].e_beta);
+    }
 }
 
 /// Without the part along the ceiling's normal, for a foot that slides.
@@ -367,8 +381,8 @@ IVL_SIM_INLINE void corner_force(const ivl_sim_params_t *raw, const kinematics_t
     const ivl_wide_t depth = height + ivl_w3_dot_d3(k->up, x) - raw->world_ceiling_height_m;
     const ivl_w3_t   v = ivl_w3_add(k->v, ivl_w3_cross_d3(k->w, x));
     const ivl_wide_t depth_rate = ivl_w3_dot(k->up, v);
-    const ivl_wide_t press = raw->plate_stiffness_Npm * depth * (1.0 + raw->plate_damping_spm * depth_rate);
-    const ivl_mask_t touches = (depth > zero) & (press > zero);
+    const ivl_wide_t force = raw->plate_stiffness_Npm * depth * (1.0 + raw->plate_damping_spm * depth_rate);
+    const ivl_wide_t press = ivl_wide_select((depth > zero) & (force > zero), force, zero);
     const ivl_w3_t   slip = ivl_w3_plus(v, -depth_rate, k->up);
     const double     slow = raw->plate_slip_speed_mps;
     const ivl_wide_t drag = raw->plate_friction_norm * press / ivl_wide_sqrt(ivl_w3_dot(slip, slip) + slow * slow);
@@ -377,7 +391,7 @@ IVL_SIM_INLINE void corner_force(const ivl_sim_params_t *raw, const kinematics_t
     const ivl_wide_t wrench[N] = {f.x, f.y, f.z, m.x, m.y, m.z};
     for (int i = 0; i < N; i++)
     {
-        b[i] = ivl_wide_select(touches, b[i] + wrench[i], b[i]);
+        b[i] += wrench[i];
     }
 }
 
@@ -427,9 +441,10 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
     kinematics_t               k;
     kinematics(model, s, &k);
     ivl_wide_t b[N], r[IVL_SIM_LEGS], u[N], axial[IVL_SIM_LEGS];
-    ivl_w3_t   f_foot[IVL_SIM_LEGS], centripetal[IVL_SIM_LEGS];
+    ivl_w3_t   f_foot[IVL_SIM_LEGS], centripetal[IVL_SIM_LEGS], couple[IVL_SIM_LEGS];
     row_t      rows[IVL_SIM_LEGS];
     body_wrench(model, load, &k, s->p_WB_m.z, b, rate->overlap_m);
+    hip_couples(model, &k, couple);
     IVL_SIM_UNROLL
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
@@ -437,9 +452,8 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
         const ivl_wide_t inv_mass = contact->inverse_mass[i], sliding = contact->sliding[i];
 
         // forces on the rod's ends: hip springs, friction of a stuck foot's joint, weight
-        const ivl_w3_t   couple = hip_couple(model, &k, i);
         const ivl_wide_t held = ivl_wide_select(inv_mass > 0.0, ivl_wide(0.0), ivl_wide(joint));
-        const ivl_w3_t   pair = ivl_w3_plus(couple, -held, k.v_rod[i]);
+        const ivl_w3_t   pair = ivl_w3_plus(couple[i], -held, k.v_rod[i]);
         f_foot[i] = ivl_w3_plus(pair, ivl_wide(-leg->weight_foot_kg * gravity), k.up);
 
         // what the hip takes from the body if neither the body nor the constraint accelerated it
@@ -448,7 +462,7 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
         const ivl_w3_t yield = ivl_w3_scale(leg->mass_cross_kg * inv_mass, along_ceiling(sliding, k.up, at_foot));
         const ivl_w3_t weight = ivl_w3_plus(pair, ivl_wide(leg->weight_hip_kg * gravity), k.up);
         const ivl_w3_t at_hip = ivl_w3_plus(ivl_w3_add(weight, yield), ivl_wide(leg->mass_hip_kg), centripetal[i]);
-        subtract_wrench(b, at_hip, ivl_w3_add(ivl_w3_cross_from_d3(hip, at_hip), ivl_w3_cross(k.rod[i], couple)));
+        subtract_wrench(b, at_hip, ivl_w3_add(ivl_w3_cross_from_d3(hip, at_hip), ivl_w3_cross(k.rod[i], couple[i])));
 
         // length constraint: n.(a_foot - a_hip) = -|v_rod|^2 / L - stabilisation
         rows[i] = constraint_row(model, contact, &k, i);
@@ -676,13 +690,16 @@ double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
         raw->body_mass_kg * raw->world_gravity_mps2 * kin->p_WB_m[2];
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        const hinge_t  h = hinge(leg, i, k.n[i]);
+        ivl_angle_t    folded[2];
+        ivl_wide_t     t[2], deflection[2];
+        (void)hinge(leg, i, k.n[i], folded, t);
+        ivl_wide_unfold(folded, t, deflection, 2);
         const ivl_d3_t v_hip = ivl_d3_add(v, ivl_d3_cross(w, leg->hip_B_m[i]));
         const ivl_d3_t v_foot = ivl_d3_add(v_hip, first(k.v_rod[i]));
         const double   hip_height = kin->p_WB_m[2] + ivl_d3_dot(leg->hip_B_m[i], up);
         energy += 0.5 * leg->mass_hip_kg * ivl_d3_dot(v_hip, v_hip) + leg->mass_cross_kg * ivl_d3_dot(v_hip, v_foot) +
                   0.5 * leg->mass_foot_kg * ivl_d3_dot(v_foot, v_foot) +
-                  0.5 * raw->leg_stiffness_Nmprad * (h.alpha[0] * h.alpha[0] + h.beta[0] * h.beta[0]) +
+                  0.5 * raw->leg_stiffness_Nmprad * (deflection[0][0] * deflection[0][0] + deflection[1][0] * deflection[1][0]) +
                   raw->world_gravity_mps2 * (leg->weight_hip_kg * hip_height + leg->weight_foot_kg * kin->p_foot_W_m[i][2]);
     }
     return energy + plate_energy(model, up, kin->p_WB_m[2], IVL_SIM_PROP_PLATE) +

@@ -18,7 +18,7 @@
 #if defined(__clang__)
 #define IVL_SIM_UNROLL _Pragma("unroll")
 #else
-#define IVL_SIM_UNROLL _Pragma("GCC unroll 8")
+#define IVL_SIM_UNROLL _Pragma("GCC unroll 16")
 #endif
 
 #define IVL_SIM_INLINE static inline __attribute__((always_inline))
@@ -281,27 +281,44 @@ IVL_SIM_INLINE ivl_angle_t ivl_wide_fold(ivl_wide_t s, ivl_wide_t c)
     return a;
 }
 
-/// The angle, in [-pi, pi], given t = num / den.
-IVL_SIM_INLINE ivl_wide_t ivl_wide_unfold(const ivl_angle_t *a, ivl_wide_t t)
+/// The angles, in [-pi, pi], given t = num / den of each.  The chains of several polynomials run side by side, since one
+/// alone waits for each of its steps.
+IVL_SIM_INLINE void ivl_wide_unfold(const ivl_angle_t *a, const ivl_wide_t *t, ivl_wide_t *angle, int n)
 {
-    const ivl_wide_t u = t * t;
-    ivl_wide_t       p = ivl_wide(IVL_SIM_ATAN[10]);
+    ivl_wide_t u[IVL_SIM_LANES], p[IVL_SIM_LANES];
+    IVL_SIM_UNROLL
+    for (int i = 0; i < n; i++)
+    {
+        u[i] = t[i] * t[i];
+        p[i] = ivl_wide(IVL_SIM_ATAN[10]);
+    }
     IVL_SIM_UNROLL
     for (int k = 9; k >= 0; k--)
     {
-        p = p * u + IVL_SIM_ATAN[k];
+        IVL_SIM_UNROLL
+        for (int i = 0; i < n; i++)
+        {
+            p[i] = p[i] * u[i] + IVL_SIM_ATAN[k];
+        }
     }
-    p = p * t + ivl_wide_select(a->turn, ivl_wide(0.25 * IVL_SIM_PI), ivl_wide(0.0));
-    p = ivl_wide_select(a->swap, 0.5 * IVL_SIM_PI - p, p);
-    p = ivl_wide_select(a->mirror, IVL_SIM_PI - p, p);
-    return ivl_wide_select(a->negative, -p, p);
+    IVL_SIM_UNROLL
+    for (int i = 0; i < n; i++)
+    {
+        ivl_wide_t q = p[i] * t[i] + ivl_wide_select(a[i].turn, ivl_wide(0.25 * IVL_SIM_PI), ivl_wide(0.0));
+        q = ivl_wide_select(a[i].swap, 0.5 * IVL_SIM_PI - q, q);
+        q = ivl_wide_select(a[i].mirror, IVL_SIM_PI - q, q);
+        angle[i] = ivl_wide_select(a[i].negative, -q, q);
+    }
 }
 
 /// Angle of the point (c, s) from the first axis, in [-pi, pi].
 IVL_SIM_INLINE ivl_wide_t ivl_wide_atan2(ivl_wide_t s, ivl_wide_t c)
 {
     const ivl_angle_t a = ivl_wide_fold(s, c);
-    return ivl_wide_unfold(&a, a.num / a.den);
+    const ivl_wide_t  t = a.num / a.den;
+    ivl_wide_t        angle;
+    ivl_wide_unfold(&a, &t, &angle, 1);
+    return angle;
 }
 
 IVL_SIM_INLINE double ivl_sim_atan2(double s, double c)
