@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ivl.errors import ConfigError
+from ivl.errors import ConfigError, StoreError
 from ivl.report import learn_page, page
 from ivl.report.landings import Album
 from ivl.store import read_manifest
@@ -61,7 +61,10 @@ def write(
 
 def _collector(folder: Path) -> Callable[[Path, int, Callable[[int, int], None]], tuple[dict[str, Any], Album]]:
     """What gathers the data of this kind of run; a run of `ivl learn` needs no pandas."""
-    if "sweep" not in read_manifest(folder):
+    manifest = read_manifest(folder)
+    if "map" in manifest:
+        raise StoreError(f"{folder}: is a policy map; a report is made of a run of `ivl learn` or `ivl sweep`")
+    if "sweep" not in manifest:
         return learn_page.collect
     from ivl.report import sweep_page
 

@@ -77,7 +77,7 @@ function stateAt(landing, t) {
   const q = landing.q.map(mix), norm = Math.hypot(...q);
   const pose = { p: landing.p.map(mix), R: rotationOf(q.map((value) => value / norm)) };
   const feet = [0, 1, 2, 3].map((foot) => footAt(landing, foot, clamped, pose, mix));
-  const cue = indexAt(landing.cues[0], clamped);
+  const cue = indexAt(landing.cues[0], clamped + 1e-6);
   const phase = lastEvent(landing.phases, clamped) || landing.phases[0];
   return {
     t: clamped, pose, feet, phase: phase[1], pitch: mix(landing.pitch[0]),

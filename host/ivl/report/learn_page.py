@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ivl import campaign, landing, native
+from ivl.errors import StoreError
 from ivl.experiment import POLICY, Experiment
 from ivl.outcome import four_leg
 from ivl.plots.convergence import outcome_classes
@@ -26,13 +27,15 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
         on_landing: Called with (done, all) after each landing that was flown again.
 
     Raises:
-        StoreError: The folder holds no run, or another process is working on it.
+        StoreError: The folder holds no run, nothing is finished, or another process is working on it.
     """
     experiment, n_trials = campaign.read_config(folder)
     with RunStore.open_existing(folder, native.library().outcome_dtype) as store:
         history, rollouts = store.episodes(), store.rollouts(trial=0)
     album, numbers = Album(), np.full(len(rollouts), -1)
     scored = np.flatnonzero(rollouts.status == SCORED)
+    if not scored.size:
+        raise StoreError(f"{folder}: no rollout is finished, there is nothing to report")
     notable = _notable(rollouts, scored)
     chosen = thinned(scored.tolist(), n_landings_max) | {row for _, row in notable}
     for done, row in enumerate(sorted(chosen), 1):

@@ -133,7 +133,7 @@ class SweepView {
     $("#cell-title").textContent = `${readable(sweep.gears[cell.gear])}, ${sweep.speeds[cell.speed]} m/s at ${sweep.angles[cell.angle]}°`;
     $("#cell-rate").textContent = `landing rate ${percent(cell.rate)} (95 % interval ${percent(cell.lo)} to ${percent(cell.hi)}), best trial ${percent(cell.best)}`;
     const own = this.trials.filter((trial) => trial.cell === cell.id);
-    table($("#trials-table"), ["trial", "rate", "clean", "RREV_c (1/s)", "M_yd (N mm)", "best"], own.map((t) => [String(t.trial), percent(t.rate), percent(t.clean),
+    table($("#trials-table"), ["trial", "rate", "clean", "RREV_c, 1/s", "M_yd, N mm", "best landing"], own.map((t) => [String(t.trial), percent(t.rate), percent(t.clean),
       `${t.mu_rrev.toFixed(2)} ± ${t.sigma_rrev.toFixed(2)}`, `${t.mu_moment.toFixed(2)} ± ${t.sigma_moment.toFixed(2)}`, replayButtons(this.replay, t.landing, `the best landing of trial ${t.trial}`)]));
     const others = this.cells.filter((c) => this.sameApproach(c, cell));
     table($("#gears-table"), ["gear at this approach", "rate", "best landing"], others.map((c) => [readable(sweep.gears[c.gear]), percent(c.rate), replayButtons(this.replay, c.landing, `the best landing of ${readable(sweep.gears[c.gear])}`)]));

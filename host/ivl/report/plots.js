@@ -6,7 +6,7 @@ const RATE_SCALE = "Viridis", MOMENT_SCALE = "Cividis";
 const OUTCOMES = [["four legs, clean", GREEN, "circle"], ["four legs, body contact", "#56B4E9", "square"],
   ["one or two legs", ORANGE, "triangle-up"], ["no leg", VERMILION, "x"]];
 
-const percent = (share) => (share === null || Number.isNaN(share) ? "–" : `${(100 * share).toFixed(0)} %`);
+const percent = (share) => (share === null || Number.isNaN(share) ? "–" : `${(100 * share).toFixed(0)}\u00a0%`);
 const readable = (name) => name.replaceAll("_", " ");
 
 // Numbers of a stored column { unit, values }; null is NaN.

@@ -42,8 +42,9 @@ def pack(spec: LandingSpec, world: World, trace: Trace) -> dict[str, Any]:
     scaled = np.hstack([signals[name] / TOLERANCE[name] for name in TOLERANCE])
     kept = keep_rows(rows.t_s, scaled, forced)
     packed = {name: _integers(signals[name][kept], SCALE[name]) for name in TOLERANCE}
+    # seeds are text: a browser's numbers are exact to 2^53 only
     return {
-        "spec": spec.model_dump(mode="json"),
+        "spec": {**spec.model_dump(mode="json"), "seed": str(spec.seed), "stream": str(spec.stream)},
         "outcome": _result(world, trace),
         "t": _integers(rows.t_s[kept][:, None], SCALE["t"])[0],
         **packed,

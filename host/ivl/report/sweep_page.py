@@ -114,12 +114,18 @@ def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list
     return [
         ["Vehicle and gears", f"{sweep.vehicle}, {sweep.gear_set}"],
         ["Learner", sweep.learner.name],
-        ["Cells and trials", f"{len(cells)} cells, {len(trials)} trials"],
+        ["Cells and trials", f"{len(cells)} cells, {_finished(sweep, trials)} trials"],
         ["Rollouts", f"{int(trials['n_rollouts'].sum()):,}"],
         ["Mean landing rate", f"{100 * cells['rate_mean_norm'].mean():.1f} %"],
         [f"Cells with a trial of {100 * SOLVED_RATE:.0f} % or more", f"{n_solved} of {len(cells)}"],
         ["Seed", str(sweep.seed)],
     ]
+
+
+def _finished(sweep: Sweep, trials: pd.DataFrame) -> str:
+    """Number of trials, and of how many if some are missing."""
+    n_planned = len(sweep.approaches()) * len(sweep.gear_names()) * sweep.trials
+    return str(len(trials)) if len(trials) == n_planned else f"{len(trials)} of {n_planned}"
 
 
 def _places(cells: pd.DataFrame) -> dict[str, list[Any]]:

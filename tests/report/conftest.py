@@ -1,0 +1,148 @@
+"""Runs to report on, made by the program itself, and a real browser without network."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import ivl  # isort: split
+
+from playwright.sync_api import Browser, Page, Request, Route, sync_playwright
+
+from ivl import campaign, experiment, report
+from ivl.landing import LandingSpec
+from ivl.sweep import config, folder, plan, store, work
+
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = (
+    "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
+    "--disable-sync --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader"
+)
+
+SMALL = {
+    "name": "small",
+    "doc": "A short run for tests.",
+    "vehicle": "habas2021",
+    "gear": "wide_short",
+    "gear_set": "as_simulated",
+    "speed_mps": 2.5,
+    "angle_deg": 90.0,
+    "policy": {
+        "rrev_c_per_s": {"mu0": 4.8, "sigma0": 0.8, "bounds": [0.0, 7.0]},
+        "moment_y_Nmm": {"mu0": 8.0, "sigma0": 1.0, "bounds": [0.0, 10.0]},
+    },
+    "learner": {"name": "ephe_robust"},
+    "n_rollouts": 4,
+    "budget": 24,
+    "check": {
+        "n_fresh": 10,
+        "effort": 0.05,
+        "rrev_c_per_s": {"lo": 4.5, "hi": 5.0, "step": 0.1},
+        "moment_y_Nmm": {"lo": 7.0, "hi": 9.0, "step": 1.0},
+    },
+}
+
+
+@pytest.fixture(scope="session")
+def world() -> ivl.World:
+    return ivl.World("habas2021", "wide_short", "as_simulated")
+
+
+@pytest.fixture(scope="session")
+def spec() -> LandingSpec:
+    """A landing on four feet whose feet stick at different times."""
+    return LandingSpec(gear_set="as_simulated", speed_mps=2.5, angle_deg=60.0, rrev_c_per_s=4.8, moment_y_Nmm=8.0)
+
+
+@pytest.fixture(scope="session")
+def learn_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    run = tmp_path_factory.mktemp("learn") / "run"
+    campaign.run(experiment.from_data(SMALL, "small.yaml"), run)
+    return run
+
+
+@pytest.fixture(scope="session")
+def sweep_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep of two gears, flown task by task in this process."""
+    settings = ["speeds_mps=[1.0, 2.5]", "angles_deg=[30.0, 60.0, 90.0]", "budget=48", "keep_rollouts=false"]
+    sweep = config.load_sweep("sweeps/smoke.yaml", settings, learner="ephe_robust")
+    run = tmp_path_factory.mktemp("sweep") / "run"
+    worlds = {gear: sweep.make_world(gear) for gear in sweep.gear_names()}
+    kept = folder.open_run(run, sweep, worlds, 32, resume=False)
+    library = ivl.native.library().digest()
+    for task in plan.plan(sweep, kept.task_size):
+        done = work.run_task(sweep, worlds[task.gear], task, library)
+        store.write_part(run, task.number, {**done.parts, "tasks": work.record(task, done)})
+    kept.close()
+    return run
+
+
+@pytest.fixture(scope="session")
+def learn_page(learn_run: Path) -> Path:
+    return report.write(learn_run).path
+
+
+@pytest.fixture(scope="session")
+def sweep_page(sweep_run: Path) -> Path:
+    return report.write(sweep_run).path
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    assert CHROMIUM.exists(), f"{CHROMIUM} is missing: run the tests by `make test-report`, which installs it"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), headless=True, args=FLAGS.split())
+        yield browser
+        browser.close()
+
+
+class Visit:
+    """A page in the browser, with everything that it said and asked for."""
+
+    def __init__(self, browser: Browser, path: Path) -> None:
+        self.page: Page = browser.new_page(viewport={"width": 1366, "height": 768})
+        self.complaints: list[str] = []
+        self.foreign: list[str] = []
+        own = path.resolve().as_uri()
+
+        def gate(route: Route, request: Request) -> None:
+            if request.url == own or request.url.startswith(("data:", "blob:")):
+                route.continue_()
+            else:
+                self.foreign.append(request.url)
+                route.abort()
+
+        self.page.route("**/*", gate)
+        self.page.on("console", lambda m: self.complaints.append(m.text) if m.type == "error" else None)
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.goto(own)
+        self.page.wait_for_selector("body[data-ready=true]", timeout=60_000)
+
+    def drawn(self, pane: int) -> dict[str, Any]:
+        """Where body and feet of a view are on its canvas."""
+        return dict(self.page.evaluate(f"report.replay.panes[{pane}].drawn"))
+
+    def number_of(self, pane: int) -> int:
+        """Number of the landing that a view shows."""
+        return int(self.page.evaluate(f"report.replay.panes[{pane}].index"))
+
+    def set_time(self, milliseconds: float) -> None:
+        """Move the slider as a hand does: set it, and let it tell."""
+        self.page.locator("#time").evaluate(
+            "(slider, value) => { slider.value = value; slider.dispatchEvent(new Event('input')); }", milliseconds
+        )
+
+
+@pytest.fixture(scope="session")
+def learn(browser: Browser, learn_page: Path) -> Iterator[Visit]:
+    visit = Visit(browser, learn_page)
+    yield visit
+    visit.page.close()
+
+
+@pytest.fixture(scope="session")
+def sweep(browser: Browser, sweep_page: Path) -> Iterator[Visit]:
+    visit = Visit(browser, sweep_page)
+    yield visit
+    visit.page.close()
