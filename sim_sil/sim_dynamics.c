@@ -690,8 +690,8 @@ double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
         raw->body_mass_kg * raw->world_gravity_mps2 * kin->p_WB_m[2];
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        ivl_angle_t    folded[2];
-        ivl_wide_t     t[2], deflection[2];
+        ivl_angle_t folded[2];
+        ivl_wide_t  t[2], deflection[2];
         (void)hinge(leg, i, k.n[i], folded, t);
         ivl_wide_unfold(folded, t, deflection, 2);
         const ivl_d3_t v_hip = ivl_d3_add(v, ivl_d3_cross(w, leg->hip_B_m[i]));
