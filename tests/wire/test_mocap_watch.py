@@ -1,0 +1,284 @@
+"""Which poses are believed, and what is said when none is: on made-up tracks, at 100 Hz."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ivl.errors import ConfigError
+from ivl.links.packets import Phase
+from ivl.mocap import config as configs
+from ivl.mocap.config import MocapConfig
+from ivl.mocap.guard import LossGuard
+from ivl.mocap.watch import Pose, Status, Watch, make_pose
+
+DT_S = 0.01
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+
+
+def config(**values: Any) -> MocapConfig:
+    return MocapConfig(**{"system": "mock", "body": "cf", **values})
+
+
+class Track:
+    """A watch that is fed at 100 Hz; each pose differs from the last by at least a micrometre."""
+
+    def __init__(self, **values: Any) -> None:
+        self.watch, self.t_s, self.n = Watch(config(**values)), 0.0, 0
+        self.sent: list[Pose] = []
+
+    def at(self, x_m: float, q_WB: tuple[float, float, float, float] = LEVEL, noise_m: float = 1e-6) -> Status:
+        self.n += 1
+        return self._take(Pose((x_m + self.n * noise_m, 0.0, 1.0), q_WB))
+
+    def absent(self) -> Status:
+        return self._take(None)
+
+    def _take(self, pose: Pose | None) -> Status:
+        self.t_s += DT_S
+        believed = self.watch.take(self.t_s, pose, is_present=pose is not None)
+        self.sent += [believed] if believed else []
+        return self.watch.status(self.t_s)
+
+    def settled(self, x_m: float = 0.0) -> "Track":
+        while self.at(x_m) is not Status.GOOD:
+            assert self.t_s < 1.0
+        return self
+
+
+def first(statuses: list[Status], wanted: Status) -> float:
+    """Seconds until a status is first seen."""
+    return (statuses.index(wanted) + 1) * DT_S
+
+
+def test_first_pose_is_believed_after_it_has_settled() -> None:
+    track = Track(settle_s=0.2)
+    assert track.watch.status(0.0) is Status.CONNECTING
+    statuses = [track.at(0.0) for _ in range(30)]
+    assert set(statuses[:20]) == {Status.SETTLING}
+    assert set(statuses[21:]) == {Status.GOOD}
+    assert len(track.sent) in (9, 10)
+
+
+def test_fast_flight_and_flip_are_believed() -> None:
+    track = Track().settled()
+    for i in range(40):
+        angle = 35.0 * i * DT_S
+        assert track.at(6.0 * i * DT_S, (0.0, -math.sin(angle / 2), 0.0, math.cos(angle / 2))) is Status.GOOD
+    assert track.watch.counts.n_jumps == 0
+
+
+def test_body_that_is_not_seen_is_lost_in_time_and_must_settle_again() -> None:
+    track = Track(lost_s=0.1, settle_s=0.2).settled()
+    statuses = [track.absent() for _ in range(20)]
+    assert first(statuses, Status.LOST) == pytest.approx(0.105, abs=0.006)
+    back = [track.at(0.5) for _ in range(30)]
+    assert back[0] is Status.SETTLING
+    assert first(back, Status.GOOD) == pytest.approx(0.21, abs=0.011)
+    assert track.watch.counts.n_absent == 20
+    assert track.watch.counts.n_jumps == 0
+
+
+def test_short_occlusion_costs_nothing() -> None:
+    track = Track(lost_s=0.1).settled()
+    assert {track.absent() for _ in range(8)} == {Status.GOOD}
+    assert track.at(0.05) is Status.GOOD
+
+
+def test_silence_is_told_from_occlusion() -> None:
+    track = Track(lost_s=0.1).settled()
+    assert track.watch.status(track.t_s + 0.099) is Status.GOOD
+    assert track.watch.status(track.t_s + 0.101) is Status.SILENT
+
+
+def test_frozen_pose_is_seen_in_time_and_as_old_as_its_first_frame() -> None:
+    track = Track(frozen_s=0.1).settled()
+    track.at(0.5e-2)
+    n_sent = len(track.sent)
+    statuses = [track.at(0.5e-2, noise_m=0.0) for _ in range(3)]
+    assert set(statuses) == {Status.GOOD}
+    statuses = [track.at(0.5e-2, noise_m=0.0) for _ in range(20)]
+    assert first(statuses, Status.FROZEN) <= 0.1
+    assert track.watch.age_s(track.t_s) >= 0.2
+    assert len(track.sent) - n_sent <= 10
+    assert track.watch.counts.n_frozen == 1
+    thawed = [track.at(0.5e-2) for _ in range(30)]
+    assert thawed[0] is Status.SETTLING
+    assert thawed[-1] is Status.GOOD
+
+
+def test_resting_body_with_noise_is_not_frozen() -> None:
+    track = Track(frozen_s=0.02).settled()
+    assert {track.at(0.0, noise_m=1e-7) for _ in range(200)} == {Status.GOOD}
+
+
+def test_freeze_is_not_looked_for_if_so_configured() -> None:
+    track = Track(frozen_s=None).settled()
+    assert {track.at(0.0, noise_m=0.0) for _ in range(100)} == {Status.GOOD}
+
+
+def test_single_outlier_is_dropped_and_forgotten() -> None:
+    track = Track().settled()
+    assert track.at(0.5) is Status.GOOD
+    assert track.at(0.0) is Status.GOOD
+    assert max(pose.p_W_m[0] for pose in track.sent) < 0.01
+    assert track.watch.counts.n_jumps == 1
+
+
+@pytest.mark.parametrize("jump_m", [0.15, 0.3, 0.9, 5.0])
+def test_body_that_jumps_and_stays_is_not_followed_until_it_has_settled(jump_m: float) -> None:
+    track = Track(lost_s=0.1, settle_s=0.3).settled()
+    n_sent = len(track.sent)
+    statuses = [track.at(jump_m) for _ in range(40)]
+    assert first(statuses, Status.JUMPED) == pytest.approx(0.11, abs=0.011)
+    assert len([pose for pose in track.sent[n_sent:] if pose.p_W_m[0] > 0.1]) == pytest.approx(40 - 30, abs=1)
+    assert statuses[-1] is Status.GOOD
+    assert track.watch.counts.n_jumps == 1
+
+
+def test_swapped_markers_that_turn_the_body_are_a_jump() -> None:
+    track = Track().settled()
+    turned = (0.0, 0.0, math.sin(math.pi / 4), math.cos(math.pi / 4))
+    statuses = [track.at(0.0, turned) for _ in range(15)]
+    assert statuses[-1] is Status.JUMPED
+
+
+def test_old_run_of_poses_does_not_count_as_settled() -> None:
+    track = Track(settle_s=0.2, lost_s=0.1)
+    track.at(0.0)
+    for _ in range(50):
+        track.absent()
+    assert track.at(0.0) is Status.SETTLING
+    assert track.sent == []
+
+
+@given(values=st.lists(st.floats(), min_size=0, max_size=9))
+def test_any_numbers_give_a_pose_or_none(values: list[float]) -> None:
+    pose = make_pose(values)
+    assert pose is None or math.isclose(math.hypot(*pose.q_WB), 1.0)
+
+
+def test_unusable_pose_counts_and_ages() -> None:
+    watch = Watch(config())
+    assert make_pose([0, 0, 0, 0, 0, 0, 0]) is None
+    assert make_pose([math.nan, 0, 0, 0, 0, 0, 1]) is None
+    watch.take(1.0, None, is_present=True)
+    assert watch.counts.n_unusable == 1
+    assert watch.status(1.0) is Status.LOST
+
+
+def test_y_up_turns_world_and_body() -> None:
+    # tilted by +0.2 rad about the system's x axis, which stays x; its y is up, its z points to the right (W -y)
+    pose = make_pose([1.0, 2.0, 3.0, math.sin(0.1), 0.0, 0.0, math.cos(0.1)], up="y")
+    assert pose is not None
+    assert pose.p_W_m == (1.0, -3.0, 2.0)
+    assert pose.q_WB == pytest.approx((math.sin(0.1), 0.0, 0.0, math.cos(0.1)))
+    heading = make_pose([0.0, 0.0, 0.0, 0.0, math.sin(0.3), 0.0, math.cos(0.3)], up="y")
+    assert heading is not None
+    assert heading.q_WB == pytest.approx((0.0, 0.0, math.sin(0.3), math.cos(0.3)))
+
+
+def test_rates_of_a_known_rhythm() -> None:
+    watch, t_s = Watch(config()), 0.0
+    for i in range(200):
+        t_s += 0.030 if i == 150 else 0.010
+        watch.take(t_s, Pose((i * 1e-6, 0.0, 0.0), LEVEL))
+    rates = watch.rates(t_s)
+    assert rates.interval_p50_ms == pytest.approx(10.0)
+    assert rates.interval_ms_max == pytest.approx(30.0)
+    assert rates.rate_hz == pytest.approx(199 / (198 * 0.010 + 0.030))
+    assert math.isnan(watch.rates(t_s + 60.0).rate_hz)
+
+
+# ---- what a loss means for a flight
+
+
+class Flight:
+    def __init__(self, phase: Phase) -> None:
+        self.phase, self.asked = phase, list[str]()
+        self.guard = LossGuard(lambda: self.phase, self.asked.append)
+
+    def look(self, status: Status, seconds: float, begin_s: float = 0.0) -> None:
+        for i in range(round(seconds / DT_S)):
+            self.guard.look(status, "why", begin_s + i * DT_S)
+
+
+@pytest.mark.parametrize("phase", [Phase.READY, Phase.APPROACH])
+@pytest.mark.parametrize("status", [s for s in Status if s is not Status.GOOD])
+def test_loss_before_the_trigger_asks_for_an_abort_again_and_again(phase: Phase, status: Status) -> None:
+    flight = Flight(phase)
+    flight.look(Status.GOOD, 1.0)
+    assert flight.asked == []
+    flight.look(status, 0.5, begin_s=1.0)
+    assert flight.asked[0] == flight.guard.reason == "why"
+    assert 8 <= len(flight.asked) <= 11
+    assert (flight.guard.n_aborts, flight.guard.n_ignored) == (1, 0)
+    flight.look(Status.GOOD, 0.1, begin_s=1.5)
+    flight.look(status, 0.1, begin_s=1.6)
+    assert flight.guard.n_aborts == 2
+
+
+@pytest.mark.parametrize("phase", [Phase.FLIP, Phase.COAST, Phase.ATTACHED])
+def test_nothing_interrupts_a_flip(phase: Phase) -> None:
+    flight = Flight(phase)
+    flight.look(Status.LOST, 0.5)
+    flight.look(Status.FROZEN, 0.5, begin_s=0.5)
+    assert flight.asked == []
+    assert (flight.guard.n_aborts, flight.guard.n_ignored) == (0, 1)
+
+
+@pytest.mark.parametrize("phase", [Phase.IDLE, Phase.DONE, Phase.ABORTED])
+def test_nothing_is_asked_where_nothing_flies(phase: Phase) -> None:
+    flight = Flight(phase)
+    flight.look(Status.LOST, 0.5)
+    assert flight.asked == []
+
+
+def test_loss_that_lasts_from_flip_into_the_next_approach_aborts_that() -> None:
+    flight = Flight(Phase.FLIP)
+    flight.look(Status.LOST, 0.1)
+    flight.phase = Phase.READY
+    flight.look(Status.LOST, 0.1, begin_s=0.1)
+    assert flight.guard.n_aborts == 1
+
+
+# ---- files
+
+
+def test_every_example_is_good() -> None:
+    assert configs.list_configs() == ["mock", "optitrack", "qualisys", "simulator", "vicon", "vrpn"]
+    for name in configs.list_configs():
+        assert configs.load(name).system == name
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("system: vicon\nbody: cf\n", "system vicon needs a host"),
+        ("system: mock\nbody: cf\nhost: a\n", "system mock has no host"),
+        ("system: kinect\nbody: cf\n", "system: value 'kinect'"),
+        ("system: mock\nbody: ''\n", "body: value ''"),
+        ("system: mock\nbody: cf\nlost_s: 5.0\n", "lost_s: value 5.0: .*less than or equal to 1"),
+        ("system: mock\nbody: cf\nsend_hz: .nan\n", "send_hz: value nan"),
+        ("system: mock\nbody: cf\nsend_hz: 1e2\n", "YAML reads this as text"),
+        ("system: mock\nbody: cf\nrate: 100\n", "rate: unknown key"),
+        ("[1, 2]\n", "expected a mapping"),
+    ],
+)
+def test_wrong_file_is_told_with_field_and_value(text: str, wrong: str, tmp_path: Any) -> None:
+    file = tmp_path / "lab.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError, match=rf"lab\.yaml: .*{wrong}"):
+        configs.load(str(file))
+
+
+def test_section_of_a_lab_file(tmp_path: Any) -> None:
+    file = tmp_path / "lab.yaml"
+    file.write_text("ceiling_m: 2.5\nmocap:\n  system: mock\n  body: cf\n  position_sigma_m: 0.002\n")
+    assert configs.load(str(file)).vehicle_params() == {
+        "stabilizer.estimator": 2, "locSrv.extPosStdDev": 0.002, "locSrv.extQuatStdDev": 0.03
+    }  # fmt: skip
+    with pytest.raises(ConfigError, match="no such file, and no such example"):
+        configs.load("nosuch")
