@@ -63,7 +63,7 @@ def explained(cues: npt.ArrayLike, moment_y_Nmm: npt.ArrayLike, condition: npt.A
     if len(names) < 2 or np.ptp(y) == 0:
         nothing = Estimate(float("nan"), float("nan"), float("nan"), len(names))
         return Explained(nothing, nothing, nothing, len(y))
-    models = (LinearRegression(), RandomForestRegressor(100, min_samples_leaf=5, random_state=seed))
+    models = (LinearRegression(), RandomForestRegressor(60, min_samples_leaf=5, random_state=seed))
     residual = np.stack([_residual(model, x, y, group) for model in models])
     values = _r2(residual, y, np.ones(len(y)))
     drawn = _bootstrap(residual, y, group, np.random.default_rng(seed))

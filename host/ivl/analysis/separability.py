@@ -58,7 +58,7 @@ def _svm(seed: int) -> Any:
 
 
 def _forest(seed: int) -> Any:
-    return RandomForestClassifier(200, min_samples_leaf=5, class_weight="balanced", random_state=seed)
+    return RandomForestClassifier(60, min_samples_leaf=5, class_weight="balanced", random_state=seed)
 
 
 def _linear(seed: int) -> Any:

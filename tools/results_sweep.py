@@ -1,0 +1,125 @@
+"""Regenerate the campaign's part of docs/RESULTS.md from data that are kept beside it.
+
+    .venv/bin/python tools/results_sweep.py collect RUN... [--map RUN...]   run folders -> docs/data
+    .venv/bin/python tools/results_sweep.py write                           docs/data -> docs/RESULTS.md
+    .venv/bin/python tools/results_sweep.py check                           is docs/RESULTS.md what `write` would write?
+
+A RUN is a folder of `ivl sweep`, a map's one of `ivl map`. docs/data/trials.parquet holds a row of whole numbers per
+trial (`ivl.analysis.compact`), states.parquet one per state of the policy maps, runs.json what was run. The text
+between the two marks in RESULTS.md belongs to this program; everything else in the file is written by hand.
+"""
+
+import argparse
+import difflib
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+import ivl  # noqa: F401  (sets the number of BLAS threads, before numpy is used)
+from ivl.analysis import campaign_text, compact, region
+from ivl.sweep import store
+
+ROOT = Path(__file__).parent.parent
+DATA, RESULTS = ROOT / "docs" / "data", ROOT / "docs" / "RESULTS.md"
+BEGIN, END = "<!-- campaign: begin -->", "<!-- campaign: end -->"
+_OF_A_RUN = ("name", "vehicle", "gear_set", "learner", "seed", "git_commit", "model_sha256", "library_sha256")
+
+
+@dataclass(frozen=True)
+class Data:
+    """What docs/data holds; tables without rows where a file is missing."""
+
+    trials: pd.DataFrame
+    states: pd.DataFrame
+    runs: list[dict[str, Any]]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; exit code 1 if `check` finds a difference."""
+    parser = argparse.ArgumentParser(description="regenerate the campaign's part of docs/RESULTS.md")
+    parser.add_argument("--data", type=Path, default=DATA, help="folder with the data; default: docs/data")
+    parser.add_argument(
+        "--results", type=Path, default=RESULTS, help="file to write or check; default: docs/RESULTS.md"
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    collecting = commands.add_parser("collect", help="run folders -> data")
+    collecting.add_argument("runs", nargs="+", type=Path, metavar="RUN")
+    collecting.add_argument("--map", nargs="*", type=Path, default=[], dest="maps", metavar="RUN")
+    commands.add_parser("write", help="data -> RESULTS.md")
+    commands.add_parser("check", help="compare RESULTS.md with the data")
+    args = parser.parse_args(arguments)
+    if args.command == "collect":
+        collect(args.runs, args.maps, args.data)
+        return 0
+    old = args.results.read_text(encoding="utf-8")
+    new = replace_section(old, section(read(args.data)))
+    if args.command == "write":
+        args.results.write_text(new, encoding="utf-8")
+        return 0
+    changes = difflib.unified_diff(old.splitlines(), new.splitlines(), str(args.results), "from the data", lineterm="")
+    different = list(changes)
+    print("\n".join(different[:60]) if different else f"{args.results.name}: equal to what {args.data} gives")
+    return 1 if different else 0
+
+
+def collect(runs: list[Path], maps: list[Path], folder: Path) -> None:
+    """Pack run folders into the data folder, replacing what is there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    packed = [compact.pack(store.read_trials(run), store.read_episodes(run)) for run in runs]
+    _write(pa.concat_tables(packed).unify_dictionaries(), folder / "trials.parquet")
+    states = [compact.pack_states(region.map_states(store.read_map(run))) for run in maps]
+    if states:
+        _write(pa.concat_tables(states).unify_dictionaries(), folder / "states.parquet")
+    about = [_describe(run) for run in (*runs, *maps)]
+    (folder / "runs.json").write_text(json.dumps(about, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def read(folder: Path) -> Data:
+    """The data folder; a file that is missing gives a table without rows."""
+    trials = folder / "trials.parquet"
+    states, runs = folder / "states.parquet", folder / "runs.json"
+    return Data(
+        compact.unpack(pq.read_table(trials)) if trials.exists() else pd.DataFrame(),
+        compact.unpack_states(pq.read_table(states)) if states.exists() else pd.DataFrame(),
+        json.loads(runs.read_text(encoding="utf-8")) if runs.exists() else [],
+    )
+
+
+def section(data: Data) -> str:
+    """The text between the marks."""
+    if data.trials.empty:
+        return "No campaign has been collected into docs/data.\n"
+    return campaign_text.write(data.trials, data.states, data.runs)
+
+
+def replace_section(text: str, new: str) -> str:
+    """The file's text with a new part between the marks.
+
+    Raises:
+        ValueError: The marks are not there, once each and in order.
+    """
+    if text.count(BEGIN) != 1 or text.count(END) != 1 or text.index(BEGIN) > text.index(END):
+        raise ValueError(f"expected {BEGIN} and, after it, {END}, once each")
+    head, tail = text[: text.index(BEGIN) + len(BEGIN)], text[text.index(END) :]
+    return f"{head}\n\n{new.strip()}\n\n{tail}"
+
+
+def _describe(run: Path) -> dict[str, Any]:
+    """What identifies a run, from its manifest."""
+    manifest = store.read_manifest(run)
+    return {name: manifest[name] for name in _OF_A_RUN if name in manifest}
+
+
+def _write(table: pa.Table, path: Path) -> None:
+    pq.write_table(table, path, compression="zstd", compression_level=19)
+    print(f"{path}: {table.num_rows} rows, {path.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
