@@ -10,7 +10,7 @@ import platform
 import subprocess
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from ivl import assess, experiment, links, native, yamlfile
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.learn import LearningRun, Progress, recent_rate
+from ivl.links.options import Options
 from ivl.outcome import four_leg
 from ivl.source import RolloutSource, WorldSource
 from ivl.store import DISCARDED, SCHEMA_VERSION, SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest, write_json
@@ -38,13 +39,11 @@ class Hooks:
         on_start: Run folder, known before the first rollout.
         on_episode: After each stored episode.
         on_stage: Before each stage of the search for the best possible policy: (stage, number of stages).
-        on_event: With a line of text, when a link or a vehicle has something to tell.
     """
 
     on_start: Callable[[Path], None] | None = None
     on_episode: Callable[[Progress], None] | None = None
     on_stage: Callable[[int, int], None] | None = None
-    on_event: Callable[[str], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,6 +79,7 @@ def run(
     threads: int | None = None,
     hooks: Hooks | None = None,
     uri: str | None = None,
+    flight: Options | None = None,
 ) -> RunResult:
     """Learn, judge and summarise; everything lands in `folder`.
 
@@ -92,6 +92,7 @@ def run(
         hooks: Progress.
         uri: Where to fly (see `ivl.links`); omitted: the simulator in this process, which also judges, wherever was
             flown.
+        flight: How a vehicle is flown; its folder is the run folder.
 
     Raises:
         StoreError: The folder cannot be used, or its run is of another configuration.
@@ -102,7 +103,7 @@ def run(
     world = chosen.make_world()
     manifest = make_manifest(chosen, world, n_trials, uri)
     with ExitStack() as stack:
-        source = _open_source(uri, chosen, world, threads, folder, hooks)
+        source = _open_source(uri, chosen, world, threads, folder, flight)
         stack.callback(source.close)
         store = stack.enter_context(_open(folder, chosen, manifest, resume))
         if hooks.on_start:
@@ -125,11 +126,11 @@ def run(
 
 
 def _open_source(
-    uri: str | None, chosen: Experiment, world: World, threads: int | None, folder: Path, hooks: Hooks
+    uri: str | None, chosen: Experiment, world: World, threads: int | None, folder: Path, flight: Options | None
 ) -> RolloutSource:
     if uri is None:
         return WorldSource(world, chosen, threads)
-    return links.open_source(uri, chosen, threads, folder, hooks.on_event)
+    return links.open_source(uri, chosen, threads, replace(flight or Options(), folder=folder))
 
 
 def read_config(folder: Path) -> tuple[Experiment, int | None]:

@@ -9,6 +9,8 @@ import typer
 from ivl import experiment, outcome
 from ivl.cli import console
 from ivl.errors import LinkError
+from ivl.links.options import Options
+from ivl.mocap import config as mocap_config
 from ivl.reward import RewardOptions, paper
 
 HELP = """Fly one landing with a vehicle, and print what it latched at the trigger and how it ended.
@@ -40,6 +42,9 @@ def fly(
     seed: Annotated[int, typer.Option(help="Seed of the random numbers of a software vehicle.", min=0)] = 0,
     stream: Annotated[int, typer.Option(help="Number of the rollout within the seed.", min=0)] = 0,
     csv: Annotated[Path | None, typer.Option(help="Write the flight recorder into FILE.")] = None,
+    mocap: Annotated[
+        str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
+    ] = None,
     rehearse: Annotated[bool, typer.Option("--rehearse", help="Fly a software vehicle as a drone.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -50,7 +55,8 @@ def fly(
         from ivl.links.episode import Rollout
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
-    options = crazyflie.Options(rehearse=rehearse, keep_recordings=csv is not None, say=console.say)
+    tracker = mocap_config.load(mocap) if mocap else None
+    options = Options(mocap=tracker, rehearse=rehearse, keep_recordings=csv is not None, say=console.say)
     with crazyflie.CrazyflieSource(uri, chosen, options) as source:
         landing = source.fly_one(Rollout(rrev, moment, seed, stream))
         end_reason = source.world.end_reason(int(landing.outcome["end_reason"][0]))

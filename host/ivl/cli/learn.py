@@ -9,6 +9,8 @@ from ivl import campaign, experiment
 from ivl.cli import console
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
+from ivl.links.options import Options
+from ivl.mocap import config as mocap_config
 
 HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
 
@@ -29,8 +31,8 @@ Examples:
       every tick decided by an emulated STM32
   ivl learn experiments/paper_vertical.yaml --uri udp://127.0.0.1:19850
       the whole stack: a software vehicle, started with `ivl sil`, over the protocol of the drone
-  ivl learn experiments/paper_vertical.yaml --uri radio://0/80/2M/E7E7E7E7E7
-      the drone; see docs/HARDWARE.md first
+  ivl learn experiments/paper_vertical.yaml --uri radio://0/80/2M/E7E7E7E7E7 --mocap lab.yaml
+      the drone, tracked; see docs/HARDWARE.md and docs/HOST.md first
   ivl learn --resume --out runs/mine
       go on after Ctrl-C, kill -9 or power loss
 """
@@ -53,18 +55,23 @@ def learn(
         str | None,
         typer.Option(help="Where to fly: a vehicle's link, or pil:// (emulated STM32); default: simulator."),
     ] = None,
+    mocap: Annotated[
+        str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
+    ] = None,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
 ) -> None:
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], out, resume)
     folder = out or campaign.default_folder(chosen, n_trials, resume)
-    hooks = campaign.Hooks(_announce, console.print_episode, _stage, console.say)
+    hooks = campaign.Hooks(_announce, console.print_episode, _stage)
+    flight = Options(mocap=mocap_config.load(mocap) if mocap else None, say=console.say)
     try:
-        result = campaign.run(chosen, folder, n_trials, resume, threads, hooks, uri)
+        result = campaign.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight)
     except KeyboardInterrupt:
         console.err.print(
-            f"interrupted; continue with: ivl learn --resume --out {folder}{f' --uri {uri}' if uri else ''}",
+            f"interrupted; continue with: ivl learn --resume --out {folder}{f' --uri {uri}' if uri else ''}"
+            f"{f' --mocap {mocap}' if mocap else ''}",
             highlight=False,
             soft_wrap=True,
         )

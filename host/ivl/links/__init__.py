@@ -3,12 +3,10 @@
 source = open_source("udp://127.0.0.1:19850", experiment)
 """
 
-from collections.abc import Callable
-from pathlib import Path
-
 from ivl.errors import ConfigError, LinkError
 from ivl.experiment import Experiment
 from ivl.links import pil
+from ivl.links.options import Options
 from ivl.source import RolloutSource
 
 VEHICLE_SCHEMES = ("udp", "radio", "usb", "tcp", "serial")
@@ -16,11 +14,7 @@ VEHICLE_SCHEMES = ("udp", "radio", "usb", "tcp", "serial")
 
 
 def open_source(
-    uri: str,
-    experiment: Experiment,
-    threads: int | None = None,
-    folder: Path | None = None,
-    say: Callable[[str], None] | None = None,
+    uri: str, experiment: Experiment, threads: int | None = None, options: Options | None = None
 ) -> RolloutSource:
     """The source that a URI names.
 
@@ -28,8 +22,7 @@ def open_source(
         uri: pil://, or a link to a vehicle.
         experiment: What is flown.
         threads: Worker threads; for pil://.
-        folder: Where a vehicle's journal and recordings go.
-        say: Called with each line for people that flying brings about.
+        options: How a vehicle is flown.
 
     Raises:
         ConfigError: No such scheme, or the rest of the URI makes no sense for it.
@@ -46,4 +39,4 @@ def open_source(
         from ivl.links import crazyflie  # cflib takes most of a second to load
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
-    return crazyflie.CrazyflieSource(uri, experiment, crazyflie.Options(folder=folder, say=say or (lambda _: None)))
+    return crazyflie.CrazyflieSource(uri, experiment, options)

@@ -7,9 +7,7 @@ again: nothing is scored wrongly, and nothing is lost.
 
 import json
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -18,44 +16,23 @@ from ivl import native
 from ivl.errors import LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight, sil
-from ivl.links.clock import LockStep, WallClock
+from ivl.links.clock import Clock, LockStep, WallClock
 from ivl.links.connection import check_uri
-from ivl.links.deadlines import DEADLINES, Deadlines
-from ivl.links.episode import Episode, Field, Landing, Rollout, safe_or_why, start_point
+from ivl.links.episode import Episode, Field, Landing, Rollout, make_safe, safe_or_why, start_point
 from ivl.links.fields import Room, SilField
-from ivl.links.operators import ConsoleOperator, Operator, OperatorStopped
+from ivl.links.operators import ConsoleOperator, OperatorStopped
+from ivl.links.options import Options
+from ivl.links.packets import Phase, Request
 from ivl.links.tables import Session
-from ivl.links.vehicle import PolicyRefused, Vehicle
+from ivl.links.tracking import Tracking
+from ivl.links.vehicle import Command, PolicyRefused, Vehicle
 from ivl.outcome import Outcomes, valid
 from ivl.source import Flown, Plan
 
 ATTEMPTS_MAX = 10
 _SIL_CHECKS = ("tables", "link", "phase")
-_AGAIN_S = 0.2
+_AGAIN_S, _IDLE_S = 0.2, 3.0
 JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
-
-Say = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to fly.
-
-    Attributes:
-        folder: Where the journal and the recordings go, None: nowhere.
-        operator: Who stands beside a real vehicle; None: asked in the terminal.
-        rehearse: Fly a software vehicle as if it were a drone: take-off, operator, no simulator's truth.
-        keep_recordings: Download the flight recorder of a software vehicle too (of a drone always).
-        say: Called with each line for people.
-        deadlines: Limits of the link.
-    """
-
-    folder: Path | None = None
-    operator: Operator | None = None
-    rehearse: bool = False
-    keep_recordings: bool = False
-    say: Say = lambda _: None
-    deadlines: Deadlines = DEADLINES
 
 
 class CrazyflieSource:
@@ -74,6 +51,8 @@ class CrazyflieSource:
         self.world = experiment.make_world()
         self._vehicle: Vehicle | None = None
         self._field: Field | None = None
+        self._tracking: Tracking | None = None
+        self._lockstep_was: int | None = None
         self.n_discarded = 0
         """Flights that were not scored and were flown again."""
         self._connect()
@@ -92,7 +71,7 @@ class CrazyflieSource:
 
     def close(self) -> None:
         """Bring the vehicle down, disarm it and close the link; safe to call at any time, and again."""
-        vehicle, self._vehicle = self._vehicle, None
+        vehicle = self._vehicle
         if vehicle is None:
             return
         try:
@@ -102,7 +81,7 @@ class CrazyflieSource:
                     self.options.say(f"vehicle: {done}")
                 self._give_back(vehicle)
         finally:
-            vehicle.session.close()
+            self._drop()
 
     def __enter__(self) -> "CrazyflieSource":
         """The source itself."""
@@ -142,6 +121,8 @@ class CrazyflieSource:
                 self._drop()
             except RolloutError as error:
                 self._discard(rollout, attempt, error)
+                if self._is_sil or attempt > 1:
+                    self._drop()  # a vehicle that has started anew answers, but knows nothing of us
         raise RolloutError(
             f"{self.uri}: a rollout was discarded {ATTEMPTS_MAX} times in a row; the last reason is above"
         )
@@ -157,39 +138,63 @@ class CrazyflieSource:
     def _is_sil(self) -> bool:
         return isinstance(self._field, SilField)
 
-    def _connect(self) -> None:
+    def _connect(self, again: bool = False) -> None:
+        """Connect, check, configure; `again`: whatever the vehicle is doing comes from our own flight."""
         session = Session(self.uri, self.options.deadlines)
         try:
-            software = sil.is_sil(session)
-            vehicle = Vehicle(session, LockStep(session) if software else WallClock())
-            if software and self.options.rehearse:
-                sil.put_on_floor(vehicle)
-            found = list(preflight.checks(vehicle))
-            vehicle.configure(self.world)
-            self._field = self._make_field(vehicle, software)
-            if self._is_sil:  # the reset before each landing mends the rest
-                found = [check for check in found if check.name in _SIL_CHECKS]
-            found.append(preflight.policy_range(vehicle, self._experiment))
-            if failed := preflight.failures(found):
-                raise RolloutError(f"{self.uri}: not fit to fly: {failed}")
+            self._vehicle = self._make_ready(session, again)
         except BaseException:
+            self._drop()
             session.close()
             raise
-        self._vehicle = vehicle
+
+    def _make_ready(self, session: Session, again: bool) -> Vehicle:
+        software = sil.is_sil(session)
+        if self.options.mocap is not None:
+            self._tracking = Tracking(session, self.options.mocap)
+        vehicle = Vehicle(session, self._make_clock(session, software))
+        self._field = self._make_field(vehicle, software)
+        if self._is_sil:
+            sil.reset(vehicle)
+        elif software:
+            sil.put_on_floor(vehicle)
+        elif again:
+            self.options.say(f"vehicle: {make_safe(vehicle)}")
+        found = list(preflight.checks(vehicle))
+        if self._is_sil:  # the reset before each landing mends the rest
+            found = [check for check in found if check.name in _SIL_CHECKS]
+        found.append(preflight.policy_range(vehicle, self._experiment))
+        problems = [preflight.failures(found), *(self._tracking.problems() if self._tracking else ())]
+        if any(problems):
+            raise RolloutError(f"{self.uri}: not fit to fly: {'; '.join(filter(None, problems))}")
+        vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
+        vehicle.configure(self.world)
+        if self._tracking is not None:
+            self._tracking.watch_over(vehicle)
+        return vehicle
+
+    def _make_clock(self, session: Session, software: bool) -> Clock:
+        """Lock-step where it can be had; cameras have a time of their own."""
+        if not software or self._tracking is not None:
+            return WallClock()
+        clock = LockStep(session, self._lockstep_was)
+        self._lockstep_was = clock.was
+        return clock
 
     def _make_field(self, vehicle: Vehicle, software: bool) -> Field:
         if software and not self.options.rehearse:
             return SilField(vehicle, self._experiment, self.options.keep_recordings)
         start_W_m = start_point(self.world, self._experiment)
         operator = self.options.operator or ConsoleOperator()
-        return Room(vehicle, self.world, start_W_m, operator, place=sil.put_on_floor if software else None)
+        place = sil.put_on_floor if software else None
+        return Room(vehicle, self.world, start_W_m, operator, tracking=self._tracking, place=place)
 
     def _return(self) -> None:
         """Connect again, for as long as a vehicle may stay away."""
         end_s = time.monotonic() + self.options.deadlines.return_s
         while True:
             try:
-                self._connect()
+                self._connect(again=True)
             except LinkError as error:
                 if time.monotonic() >= end_s:
                     away_s = self.options.deadlines.return_s
@@ -202,6 +207,9 @@ class CrazyflieSource:
     def _drop(self) -> None:
         """Forget a connection that is no good any more; the vehicle ends its flight by its own rules."""
         vehicle, self._vehicle = self._vehicle, None
+        tracking, self._tracking = self._tracking, None
+        if tracking is not None:
+            tracking.close()
         if vehicle is not None:
             vehicle.session.close()
 

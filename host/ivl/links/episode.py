@@ -94,6 +94,7 @@ class Episode:
             LinkError: The same, and the link is gone.
         """
         vehicle = self.vehicle
+        vehicle.abort_reason = ""
         start_W_m = field.to_start()
         battery_V = vehicle.battery_V
         policy_seq = vehicle.put_policy(rollout.rrev_c_per_s, rollout.moment_y_Nmm)
@@ -110,6 +111,8 @@ class Episode:
         """Refuse to score what was not this policy's landing."""
         vehicle = self.vehicle
         cause = vehicle.cause
+        if vehicle.abort_reason:
+            raise RolloutError(f"aborted: {vehicle.abort_reason}")
         if cause in OUTSIDE_RULES:
             raise RolloutError(f"the vehicle aborted: {cause}")
         seen = vehicle.watch.values.get("ivl.trg_seq")

@@ -10,6 +10,7 @@ from ivl.links import operators, sil
 from ivl.links.episode import Outcome, Point, Rollout
 from ivl.links.operators import Operator
 from ivl.links.packets import Phase, Recording, Request
+from ivl.links.tracking import Tracking
 from ivl.links.truth import Resting, outcome_of_flight, suggest_legs
 from ivl.links.vehicle import Command, Supervisor, Vehicle
 from ivl.world import World
@@ -76,7 +77,7 @@ class Room:
         start_W_m: Point,
         operator: Operator,
         gate: Gate | None = None,
-        resting: Callable[[Vehicle, Recording], Resting] | None = None,
+        tracking: Tracking | None = None,
         place: Callable[[Vehicle], None] | None = None,
     ) -> None:
         """A room.
@@ -87,12 +88,12 @@ class Room:
             start_W_m: Where the approach begins.
             operator: Who places the vehicle and confirms outcomes.
             gate: What must hold before each take-off.
-            resting: Tells where the vehicle is after a landing; default: its own estimate, fed by motion capture.
+            tracking: Motion capture; without it the vehicle's own estimate tells where it rests.
             place: Does with a software vehicle what the operator's hands do with a drone.
         """
         self._vehicle, self._world, self._start_W_m, self._operator = vehicle, world, start_W_m, operator
         self._gate = gate or Gate()
-        self._resting = resting or resting_by_estimate
+        self._tracking = tracking
         self._place = place
 
     def to_start(self) -> Point:
@@ -118,6 +119,8 @@ class Room:
     def _check_gate(self) -> None:
         """Ask for another battery until one is good; a vehicle without power is a lost link, which the caller sees."""
         vehicle = self._vehicle
+        if self._tracking is not None and (problems := self._tracking.problems()):
+            raise RolloutError("; ".join(problems))
         while not vehicle.battery_V >= self._gate.battery_V:
             self._operator.change_battery(vehicle.battery_V, self._gate.battery_V)
             vehicle.pause(0.5)
@@ -155,9 +158,12 @@ class Room:
         self._restore_tumble_check()
         aborted = vehicle.phase == Phase.ABORTED
         why = vehicle.cause
+        if vehicle.abort_reason and aborted:
+            raise RolloutError(f"aborted: {vehicle.abort_reason}")
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         recording = vehicle.recording(policy_seq)
-        resting = self._resting(vehicle, recording)
+        seen_at = self._tracking.resting() if self._tracking is not None else None
+        resting = seen_at or resting_by_estimate(vehicle, recording)
         suggested = operators.Seen(0 if aborted else suggest_legs(resting, self._world), body_contact=False)
         seen = self._operator.confirm(suggested, resting, f"aborted: {why}" if aborted else "")
         if seen.discard:

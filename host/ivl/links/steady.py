@@ -136,7 +136,8 @@ def _first_line(text: str) -> str:
     """What went wrong, without cflib's traceback behind it."""
     lines = [line.strip() for line in text.splitlines() if line.strip()] or ["no reason given"]
     first = lines[0].removeprefix("Couldn't load link driver:").strip()
-    return first if first and not first.startswith("Error communicating") else lines[-1]
+    vague = not first or first.startswith("Error communicating") or "Could not send" in first
+    return lines[-1] if vague else first
 
 
 def _quicken(link: Any) -> None:

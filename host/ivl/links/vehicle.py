@@ -8,7 +8,7 @@ import secrets
 import struct
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
 
 import numpy as np
@@ -39,6 +39,7 @@ _PORT_SUPERVISOR, _PORT_HL, _PORT_PLATFORM, _APP = 9, 8, 13, 2
 _ECHO_S, _ECHO_POLL_S = 2.0, 0.01
 _RECORDER_TRIES = 3
 _WALL_POLL_S = 0.005
+_LOGS_S = 3.0
 
 
 class Supervisor(IntFlag):
@@ -98,6 +99,8 @@ class Vehicle:
         """
         self.session, self.clock = session, clock or WallClock()
         self.command = Command(Request.IDLE)
+        self.abort_reason = ""
+        """Why `abort` was called last; cleared by who flies."""
         self._seq = secrets.randbits(16)
         self._policy_seq = secrets.randbits(31)
         self._echo: dict[PacketType, Packet] = {}
@@ -115,6 +118,8 @@ class Vehicle:
         session.listen(_PORT_PLATFORM, _APP, self._on_app)
         for block in (self.watch, self.state, self.trigger, self.config):
             session.start_log(block)
+        if not self.wait_in_wall_time(lambda: bool(self.watch.values), _LOGS_S):
+            raise LinkError(f"{session.uri}: no log variables came within {_LOGS_S:g} s")
 
     def _on_app(self, data: bytes) -> None:
         packet = decode(data)
@@ -173,6 +178,12 @@ class Vehicle:
         )  # fmt: skip
         self.session.send(_PORT_PLATFORM, _APP, data)
         return self._seq
+
+    def abort(self, reason: str) -> None:
+        """Ask for an abort, once; before the trigger it is obeyed, later it changes nothing. From any thread."""
+        self.abort_reason = reason
+        self.command = replace(self.command, request=Request.ABORT)
+        self.send_command()
 
     def ask_for(self, command: Command, phases: tuple[Phase, ...], limit_s: float) -> Phase:
         """Put a command in force and wait until the vehicle is in one of the phases.

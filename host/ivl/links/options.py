@@ -1,0 +1,40 @@
+"""How a vehicle is flown, beside where and what."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ivl.links.deadlines import DEADLINES, Deadlines
+from ivl.mocap.config import MocapConfig
+
+if TYPE_CHECKING:
+    from ivl.links.operators import Operator
+
+
+def silent(text: str) -> None:
+    """Tell nobody."""
+    del text
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to fly.
+
+    Attributes:
+        folder: Where the journal and the recordings go, None: nowhere.
+        operator: Who stands beside a real vehicle; None: asked in the terminal.
+        mocap: Tracking system that follows the vehicle; None: somebody else streams poses, or the vehicle needs none.
+        rehearse: Fly a software vehicle as if it were a drone: take-off, operator, no simulator's truth.
+        keep_recordings: Download the flight recorder of a software vehicle too (of a drone always).
+        say: Called with each line for people.
+        deadlines: Limits of the link.
+    """
+
+    folder: Path | None = None
+    operator: "Operator | None" = None
+    mocap: MocapConfig | None = None
+    rehearse: bool = False
+    keep_recordings: bool = False
+    say: Callable[[str], None] = silent
+    deadlines: Deadlines = DEADLINES

@@ -1,0 +1,58 @@
+"""Motion capture of one connection: poses to the vehicle, an abort when they stop in time, the resting pose."""
+
+from contextlib import ExitStack
+from typing import Any
+
+from ivl.links.tables import Session
+from ivl.links.truth import Resting
+from ivl.links.vehicle import Vehicle
+from ivl.mocap.config import MocapConfig
+from ivl.mocap.guard import LossGuard
+from ivl.mocap.simulated import SimulatedRoom
+from ivl.mocap.stream import Mocap
+
+
+class Tracking:
+    """A tracking system that follows the vehicle of a session."""
+
+    def __init__(self, session: Session, config: MocapConfig) -> None:
+        """Start it, and wait until the pose is good.
+
+        Raises:
+            LinkError: It is not good in time; the message says why.
+        """
+        self._stack = ExitStack()
+        self.room: SimulatedRoom | None = None
+        """Cameras of a software vehicle (system `simulator`); their faults are attributes."""
+        try:
+            request: dict[str, Any] | None = None
+            if config.system == "simulator":
+                self.room = self._stack.enter_context(SimulatedRoom(session, config.body))
+                session.write({"sil.pose_source": 1})
+                request = self.room.request(config)
+            session.write({name: value for name, value in config.vehicle_params().items() if session.has_param(name)})
+            self.mocap = self._stack.enter_context(Mocap(config, session.cf.extpos, request))
+            self.mocap.wait_until_good()
+        except BaseException:
+            self.close()
+            raise
+
+    def watch_over(self, vehicle: Vehicle) -> None:
+        """From now on a loss before the trigger aborts the flight."""
+        self.mocap.guard = LossGuard(lambda: int(vehicle.phase), vehicle.abort)
+
+    def problems(self) -> list[str]:
+        """What speaks against a flight now, one line each."""
+        return self.mocap.problems()
+
+    def resting(self) -> Resting | None:
+        """Where the cameras see the vehicle; None if they do not."""
+        state = self.mocap.state()
+        if state.pose is None or state.age_s > self.mocap.config.restart_s:
+            return None
+        x, y, _, _ = state.pose.q_WB
+        return Resting(state.pose.p_W_m[2], 1.0 - 2.0 * (x * x + y * y))
+
+    def close(self) -> None:
+        """End it; again does nothing."""
+        self._stack.close()
