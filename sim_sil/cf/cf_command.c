@@ -231,7 +231,8 @@ bool ivl_cf_set_full_state(ivl_cf_t *cf, const float p_W_m[3], const float v_W_m
 
 // ---- high-level commander
 
-static int begin(ivl_cf_t *cf, ivl_cf_plan_t plan, ivl_vec3_t p_W_m, float yaw_rad, float duration_s)
+/// @param[in] allowed  the planner is in a state for it
+static int begin(ivl_cf_t *cf, bool allowed, ivl_cf_plan_t plan, ivl_vec3_t p_W_m, float yaw_rad, float duration_s)
 {
     const bool good =
         ivl_vec3_within(p_W_m, METRES_MAX) && ivl_within(yaw_rad, DEG_MAX) && duration_s >= 0.0f && duration_s <= DURATION_S_MAX;
@@ -242,6 +243,10 @@ static int begin(ivl_cf_t *cf, ivl_cf_plan_t plan, ivl_vec3_t p_W_m, float yaw_r
     if (!ivl_cf_supervisor_motors_allowed(&cf->supervisor))
     {
         return EBUSY;
+    }
+    if (!allowed)
+    {
+        return EPERM;
     }
     ivl_cf_planner_go(&cf->planner, plan, p_W_m, yaw_rad, duration_s, ivl_cf_now_ms(cf));
     return 0;
@@ -255,24 +260,18 @@ static ivl_vec3_t above(const ivl_cf_t *cf, float height_m)
 
 int ivl_cf_hl_takeoff(ivl_cf_t *cf, float height_m, float yaw_rad, bool use_current_yaw, float duration_s)
 {
-    if (cf->planner.plan != IVL_CF_PLAN_STOPPED)
-    {
-        return EPERM;
-    }
+    const bool  rests = cf->planner.plan == IVL_CF_PLAN_STOPPED;
     const float yaw = use_current_yaw ? cf->planner.last.yaw_rad : yaw_rad;
-    return begin(cf, IVL_CF_PLAN_FLYING, above(cf, height_m), yaw, duration_s);
+    return begin(cf, rests, IVL_CF_PLAN_FLYING, above(cf, height_m), yaw, duration_s);
 }
 
 int ivl_cf_hl_land(ivl_cf_t *cf, float height_m, float yaw_rad, bool use_current_yaw, float duration_s)
 {
     // stopped in the air by a streamed set-point that has been given up since: it lands from where the vehicle is
-    const bool idle = cf->planner.plan == IVL_CF_PLAN_STOPPED && !ivl_cf_supervisor_is_flying(&cf->supervisor);
-    if (cf->planner.plan == IVL_CF_PLAN_LANDING || idle)
-    {
-        return EPERM;
-    }
+    const bool  rests = cf->planner.plan == IVL_CF_PLAN_STOPPED && !ivl_cf_supervisor_is_flying(&cf->supervisor);
+    const bool  allowed = cf->planner.plan != IVL_CF_PLAN_LANDING && !rests;
     const float yaw = use_current_yaw ? cf->planner.last.yaw_rad : yaw_rad;
-    return begin(cf, IVL_CF_PLAN_LANDING, above(cf, height_m), yaw, duration_s);
+    return begin(cf, allowed, IVL_CF_PLAN_LANDING, above(cf, height_m), yaw, duration_s);
 }
 
 int ivl_cf_hl_go_to(ivl_cf_t *cf, bool relative, bool linear, const float p_W_m[3], float yaw_rad, float duration_s)
@@ -280,7 +279,7 @@ int ivl_cf_hl_go_to(ivl_cf_t *cf, bool relative, bool linear, const float p_W_m[
     (void)linear;
     const ivl_cf_goal_t *last = &cf->planner.last;
     const ivl_vec3_t     p = relative ? ivl_add(last->p_W_m, vec(p_W_m)) : vec(p_W_m);
-    return begin(cf, IVL_CF_PLAN_FLYING, p, relative ? last->yaw_rad + yaw_rad : yaw_rad, duration_s);
+    return begin(cf, true, IVL_CF_PLAN_FLYING, p, relative ? last->yaw_rad + yaw_rad : yaw_rad, duration_s);
 }
 
 int ivl_cf_hl_stop(ivl_cf_t *cf)

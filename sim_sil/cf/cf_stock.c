@@ -8,6 +8,8 @@
 
 // A wanted point that moves with a wanted velocity waits for the vehicle within this distance.
 static const float LEAD_M = 0.3f;
+// The same for a heading: half a turn away, the law would not know which way round.
+static const float LEAD_RAD = 1.0f;
 static const float TILT_RAD_MAX = 0.9f;
 static const float PI_F = 3.14159265f;
 
@@ -33,17 +35,16 @@ static float drawn_along(float wanted_m, float v_mps, float dt_s, float is_m)
     return ivl_clamp(wanted_m + v_mps * dt_s, is_m - LEAD_M, is_m + LEAD_M);
 }
 
-static void want_heading(ivl_cf_stock_t *stock, const ivl_cf_setpoint_t *sp, float dt_s)
+static float wrapped(float angle_rad)
 {
-    if (sp->yaw == IVL_CF_MODE_ABS)
-    {
-        stock->yaw_rad = sp->yaw_rad;
-    }
-    else
-    {
-        stock->yaw_rad += sp->yawrate_radps * dt_s;
-        stock->yaw_rad -= 2.0f * PI_F * floorf(stock->yaw_rad / (2.0f * PI_F) + 0.5f);
-    }
+    return angle_rad - 2.0f * PI_F * floorf(angle_rad / (2.0f * PI_F) + 0.5f);
+}
+
+static void want_heading(ivl_cf_stock_t *stock, const ivl_sample_t *now, const ivl_cf_setpoint_t *sp, float dt_s)
+{
+    const float is_rad = ivl_cf_yaw_of(now->q_WB);
+    const float wanted_rad = (sp->yaw == IVL_CF_MODE_ABS) ? sp->yaw_rad : stock->yaw_rad + sp->yawrate_radps * dt_s;
+    stock->yaw_rad = wrapped(is_rad + ivl_clamp(wrapped(wanted_rad - is_rad), -LEAD_RAD, LEAD_RAD));
 }
 
 static void want_tilt(ivl_cf_stock_t *stock, const ivl_cf_setpoint_t *sp, float dt_s)
@@ -142,7 +143,7 @@ void ivl_cf_stock_step(ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sa
         begin(stock, now);
     }
     ivl_reference_t ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
-    want_heading(stock, sp, dt_s);
+    want_heading(stock, now, sp, dt_s);
     want_tilt(stock, sp, dt_s);
     want_xy(stock, cfg, now, sp, dt_s, &ref);
     want_z(stock, now, sp, dt_s, &ref);
