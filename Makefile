@@ -1,13 +1,15 @@
 # The front door.  `make` lists the targets.
 #
 # This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
-# Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS.
+# Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS, VEHICLE, GEAR, SIL_ARGS,
+# FUZZ_RUNS, FUZZ_ARGS.
 
 PYTHON     ?= python3
 CLANG      ?= clang-14
 FLAVOUR    ?= release
 JOBS       ?= $(shell getconf _NPROCESSORS_ONLN)
 EXPERIMENT ?= experiments/paper_vertical.yaml
+FUZZ_RUNS  ?= 5000000
 ifeq ($(origin CC),default)
 CC := $(if $(shell command -v gcc),gcc,cc)
 endif
@@ -40,9 +42,13 @@ help: ## list the targets
 setup: $(VENV)/.stamp-run ## create .venv with the package `ivl` and what it needs to run
 
 .PHONY: build
-build: ## compile firmware core and simulator into the library that Python loads
+build: ## compile firmware core and simulator into the library that Python loads, and the software vehicle
 	$(say) 'build: compiling firmware core and simulator ($(FLAVOUR))'
-	@+$(NATIVE) FLAVOUR=$(FLAVOUR) lib
+	@+$(NATIVE) FLAVOUR=$(FLAVOUR) lib sil
+
+.PHONY: sil
+sil: setup build ## start the software vehicle on udp://127.0.0.1:19850 (VEHICLE=... GEAR=... SIL_ARGS='--speed 10')
+	@$(BIN)/ivl sil $(if $(VEHICLE),--vehicle $(VEHICLE)) $(if $(GEAR),--gear $(GEAR)) $(SIL_ARGS)
 
 .PHONY: learn
 learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for another)
@@ -107,7 +113,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 .PHONY: test
-test: lint test-c san golden test-py test-wire test-physics test-mujoco test-analysis pil sizes-diff ## everything below, set-up and compilers included
+test: lint test-c san golden test-py test-wire test-sil test-physics test-mujoco test-analysis test-report pil sizes-diff ## everything below, set-up and compilers included
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
@@ -145,6 +151,21 @@ test-py: setup-dev build ## tests of the Python package
 	$(say) 'test-py: pytest tests/py'
 	@$(BIN)/python -m pytest tests/py $(PYTEST_ARGS)
 
+.PHONY: test-sil
+test-sil: setup-dev build toolchain ## the software vehicle with unmodified cflib, and a short fuzz of its packets
+	@+$(NATIVE) FLAVOUR=san sil
+	@tools/apt_install.sh $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
+	@+$(NATIVE) FLAVOUR=fuzz fuzz
+	$(say) 'test-sil: pytest tests/sil'
+	@$(BIN)/python -m pytest tests/sil $(PYTEST_ARGS)
+
+.PHONY: fuzz
+fuzz: toolchain setup build ## fuzz the packets of the software vehicle (FUZZ_RUNS=5000000 inputs; FUZZ_ARGS for libFuzzer)
+	@tools/apt_install.sh $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
+	@+$(NATIVE) FLAVOUR=fuzz fuzz
+	$(say) 'fuzz: $(FUZZ_RUNS) inputs; new ones are kept in build/fuzz/corpus'
+	@tools/fuzz.sh build/fuzz/fuzz_crtp $(FUZZ_RUNS) $(FUZZ_ARGS)
+
 .PHONY: test-wire
 test-wire: setup-dev build ## CRTP over a CAN bus, and motion capture
 	$(say) 'test-wire: pytest tests/wire'
@@ -154,6 +175,11 @@ test-wire: setup-dev build ## CRTP over a CAN bus, and motion capture
 test-physics: setup-dev build ## landings with known properties, and a sample of the step-size study
 	$(say) 'test-physics: pytest tests/physics'
 	@$(BIN)/python -m pytest tests/physics $(PYTEST_ARGS)
+
+.PHONY: test-report
+test-report: setup-dev build chromium ## reports in a real browser, exports read back by the formats' own readers
+	$(say) 'test-report: pytest tests/report'
+	@$(BIN)/python -m pytest tests/report $(PYTEST_ARGS)
 
 .PHONY: step-study
 step-study: setup-dev build ## ten thousand landings with shorter and shorter steps (2 min)
@@ -214,17 +240,21 @@ cross-toolchain: ## install what compiles for the vehicle and emulates it (Debia
 	    $$(echo '#include <string.h>' | arm-none-eabi-gcc -E -x c - > /dev/null 2>&1 || echo :libnewlib-arm-none-eabi) \
 	    qemu-system-arm:qemu-system-arm $(CLANG):clang-14
 
+.PHONY: chromium
+chromium: ## install the browser that the reports are tested in (Debian; needs root only if it is missing)
+	@tools/apt_install.sh chromium:chromium
+
 .PHONY: clean
 clean: ## remove what was compiled
 	$(say) 'clean: build/, native library, caches'
-	@rm -rf build host/ivl/_native/*.so host/ivl/_native/*.elf .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	@rm -rf build host/ivl/_native/*.so host/ivl/_native/*.elf host/ivl/_native/ivl_sil .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 .PHONY: distclean
 distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h tests/c/*.[ch] tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
 
 # set-up, each step once
 

@@ -1,6 +1,6 @@
 # Compiles firmware core, simulator and C tests.  Called by the Makefile as
 #     make -f tools/native.mk FLAVOUR=<flavour> <target>
-# Targets: core, lib, sil, check.  Everything made is in build/<flavour>/.
+# Targets: core, lib, sil, check, fuzz (flavour fuzz only).  Everything made is in build/<flavour>/.
 # Each source is compiled once per flavour; the library and the tests link the same objects.
 
 FLAVOUR ?= release
@@ -9,7 +9,7 @@ CLANG   ?= clang-14
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
 # sse2 and avx2 are the release held to registers of 128 and 256 bits
-FLAVOURS           := release O0 san sse2 avx2 clang clang-O0
+FLAVOURS           := release O0 san sse2 avx2 clang clang-O0 fuzz
 OPTIMISE_release   := -O3 -fno-semantic-interposition
 OPTIMISE_O0        := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
@@ -17,10 +17,11 @@ OPTIMISE_sse2      := -O3 -DIVL_SIM_WIDEST_BITS=128
 OPTIMISE_avx2      := -O3 -DIVL_SIM_WIDEST_BITS=256
 OPTIMISE_clang     := -O3
 OPTIMISE_clang-O0  := -O0
+OPTIMISE_fuzz      := -O2 -g -fno-omit-frame-pointer $(SANITIZE)
 ifeq ($(filter $(FLAVOUR),$(FLAVOURS)),)
 $(error FLAVOUR=$(FLAVOUR) is not one of: $(FLAVOURS))
 endif
-COMPILER := $(if $(filter clang%,$(FLAVOUR)),$(CLANG),$(CC))
+COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(CC))
 
 WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
@@ -60,6 +61,15 @@ FLAGS_tests/c := $(FLAGS_unity) $(FLAGS_sim_sil) -Itests/c -Isim_sil/cf -Itests/
 # the link server, and a vehicle that only writes down what it is told, for its tests
 FLAGS_sim_sil/crtp := $(FLAGS_sim_sil)
 FLAGS_tests/crtp   := $(FLAGS_sim_sil)
+FLAGS_tests/fuzz   := $(FLAGS_sim_sil)
+
+# The fuzzer is guided by the server and the vehicle, not by the physics, which costs time and says little.  Comparisons are followed in the
+# server alone: the vehicle searches its tables by name when it starts.
+ifeq ($(FLAVOUR),fuzz)
+FLAGS_sim_sil/crtp += -fsanitize=fuzzer-no-link
+FLAGS_sim_sil/cf   += -fsanitize-coverage=inline-8bit-counters,pc-table
+FLAGS_firmware/app += -fsanitize-coverage=inline-8bit-counters,pc-table
+endif
 
 BUILD   := build/$(FLAVOUR)
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
@@ -74,7 +84,7 @@ FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core lib sil check FORCE
+.PHONY: core lib sil check fuzz FORCE
 
 core: $(CORE)
 
@@ -103,6 +113,12 @@ $(SERVER): $(BUILD)/ivl_sil
 $(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -o $@ $(filter %.o,$^) $(LDLIBS)
+
+fuzz: $(BUILD)/fuzz_crtp
+
+$(BUILD)/fuzz_crtp: $(BUILD)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
 
 $(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(CORE) $(SIM) $(CRTP) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'

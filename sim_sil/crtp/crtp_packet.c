@@ -17,7 +17,7 @@ bool ivl_crtp_parse(ivl_crtp_packet_t *packet, const uint8_t *bytes, size_t size
 
 size_t ivl_crtp_bytes(const ivl_crtp_packet_t *packet, uint8_t *bytes)
 {
-    bytes[0] = (uint8_t)((packet->port << 4) | 0x0Cu | packet->channel);
+    bytes[0] = (uint8_t)(((unsigned)packet->port << 4) | 0x0Cu | packet->channel);
     memcpy(bytes + 1, packet->data, packet->size);
     return 1u + packet->size;
 }

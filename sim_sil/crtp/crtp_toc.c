@@ -51,7 +51,10 @@ bool ivl_crtp_toc_find(const ivl_crtp_toc_t *toc, const char *group, const char 
 {
     for (uint16_t i = 0; i < toc->n; i++)
     {
-        if ((strcmp(toc->items[i].name, name) == 0) && (strcmp(toc->items[i].group, group) == 0))
+        const ivl_crtp_toc_item_t *item = &toc->items[i];
+        // the first characters differ most often, and a comparison of texts is a call
+        if ((item->name[0] == name[0]) && (item->group[0] == group[0]) && (strcmp(item->name, name) == 0) &&
+            (strcmp(item->group, group) == 0))
         {
             *id = i;
             return true;

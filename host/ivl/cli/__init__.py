@@ -18,8 +18,10 @@ from ivl.cli import (
     fly,
     learn,
     listing,
+    mocap,
     report,
     rollout,
+    sil,
     sweep,
 )
 from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
@@ -36,8 +38,10 @@ app.command("rollout", help=rollout.HELP)(rollout.rollout)
 app.command("list", help=listing.HELP)(listing.list_)
 app.command("bench", help=bench.HELP)(bench.bench)
 app.command("flash", help=flash.HELP)(flash.flash)
+app.command("sil", help=sil.HELP)(sil.sil)
 app.command("doctor", help=doctor.HELP)(doctor.doctor)
 app.command("fly", help=fly.HELP)(fly.fly)
+app.command("mocap", help=mocap.HELP)(mocap.mocap)
 app.command("can-gateway", help=can_gateway.HELP)(can_gateway.can_gateway)
 app.command("sweep", help=sweep.HELP)(sweep.sweep)
 app.command("map", help=sweep.MAP_HELP)(sweep.map_)

@@ -1,0 +1,90 @@
+"""`ivl sil`."""
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ivl import model
+from ivl.cli import console
+from ivl.experiment import load, parse_setting
+from ivl.silproc import model_text, server_path
+from ivl.world import World
+
+HELP = """Start the software vehicle: a CRTP server on UDP.
+
+cflib, cfclient and other CRTP tools find it by scanning and connect to udp://127.0.0.1:19850.  Ctrl-C stops it.
+docs/SIL.md says what it does, docs/first_flight.py is a first program.
+
+\b
+Examples:
+  ivl sil
+      the paper's vehicle in real time
+  ivl sil --experiment experiments/paper_vertical.yaml --speed max
+      what an experiment flies, as fast as possible
+  ivl sil --vehicle crazyflie21 --vehicles 8
+      eight vehicles on ports 19850 .. 19857
+  ivl sil --lockstep
+      time stands still until the client writes sil.run_to_ms
+  ivl sil --fault loss=0.05 --fault jitter_ms=50 --control 20850
+      a bad link, and a port at which it can be changed
+  ivl sil --write-model vehicle.txt
+      the parameters as the program ivl_sil reads them, then stop
+"""
+
+
+def sil(
+    vehicle: Annotated[str | None, typer.Option(help="Vehicle; see `ivl list vehicles`.  [default: habas2021]")] = None,
+    gear: Annotated[str | None, typer.Option(help="Landing gear; see `ivl list gears`.  [default: wide_short]")] = None,
+    gear_set: Annotated[str | None, typer.Option(help="Set of landing gears.  [default: table1]")] = None,
+    experiment: Annotated[str | None, typer.Option(help="Vehicle, gear and settings of an experiment.")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="A.B=C", help="Change a parameter of the world.")
+    ] = None,
+    port: Annotated[int, typer.Option(help="UDP port of the first vehicle; 0 takes a free one.")] = 19850,
+    bind: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 lets everybody fly.")] = "127.0.0.1",
+    vehicles: Annotated[int, typer.Option(help="How many, on consecutive ports.")] = 1,
+    speed: Annotated[str, typer.Option(metavar="N|max", help="Multiple of real time.")] = "1",
+    lockstep: Annotated[bool, typer.Option(help="Time advances only as the client asks.")] = False,
+    packets: Annotated[int, typer.Option(help="Packets/s to the client, at most, when time is not paced.")] = 8000,
+    seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.", min=0)] = 0,
+    fault: Annotated[list[str] | None, typer.Option(metavar="NAME=X", help="A fault of the link: loss, ...")] = None,
+    control: Annotated[int | None, typer.Option(help="UDP port that no fault touches; 0 takes a free one.")] = None,
+    write_model: Annotated[Path | None, typer.Option(help="Write the parameters to FILE and stop.")] = None,
+) -> None:
+    """Start the software vehicle; HELP is the text that people see."""
+    world = _world(vehicle, gear, gear_set, experiment, settings or [])
+    text = model_text(world)
+    if write_model is not None:
+        write_model.write_text(text, encoding="ascii")
+        return
+    command = [str(server_path()), "--model", "-", "--port", str(port), "--bind", bind]
+    command += ["--vehicles", str(vehicles), "--speed", speed, "--packets", str(packets), "--seed", str(seed)]
+    command += ["--lockstep"] if lockstep else []
+    command += [] if control is None else ["--control", str(control)]
+    for item in fault or []:
+        command += ["--fault", item]
+    console.err.print(
+        f"{world.vehicle} with gear {world.gear} of {world.gear_set}; Ctrl-C stops", highlight=False, soft_wrap=True
+    )
+    _become(command, text)
+
+
+def _world(
+    vehicle: str | None, gear: str | None, gear_set: str | None, experiment: str | None, rest: list[str]
+) -> World:
+    if experiment is not None:
+        return load(experiment, rest, vehicle=vehicle, gear=gear, gear_set=gear_set).make_world()
+    overrides = dict(parse_setting(text) for text in rest)
+    return World(vehicle or "habas2021", gear or "wide_short", gear_set or model.DEFAULT_GEAR_SET, **overrides)
+
+
+def _become(command: list[str], text: str) -> None:
+    """Replace this process, so that signals and the exit code are the program's own; it reads the model from stdin."""
+    with tempfile.TemporaryFile("w+", encoding="ascii") as file:
+        file.write(text)
+        file.seek(0)
+        os.dup2(file.fileno(), 0)
+        os.execv(command[0], command)

@@ -1,0 +1,171 @@
+/// @file fuzz_crtp.c
+/// libFuzzer on the packet entry of the software vehicle: each input is a sequence of datagrams, waits and link events, played to a vehicle
+/// that has just booted.
+///
+/// A record begins with one byte: 0x00..0x3F a datagram of so many bytes, which follow; 0x40..0x7F a line of 0..63 bytes for the control
+/// channel; 0x80..0xBF 1..64 ms of the vehicle; 0xC0..0xFF the link goes down (even) or comes up (odd).
+/// The environment variable IVL_FUZZ_MODEL names the file of the vehicle's parameters.
+#include <assert.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "crtp/crtp_control.h"
+#include "crtp/crtp_model_file.h"
+#include "crtp/crtp_server.h"
+
+int LLVMFuzzerInitialize(int *argc, char ***argv);
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+enum
+{
+    STEPS_MAX = 200
+};
+
+static ivl_sim_model_t        *model;
+static ivl_cf_t               *cf;
+static ivl_crtp_t              server, fresh;
+static ivl_crtp_param_state_t *fresh_state;
+static unsigned                n_sent;
+
+// every byte of an answer is looked at, so that one that was never written is seen
+static void look_at(void *context, const ivl_crtp_packet_t *packet)
+{
+    static volatile uint8_t sum;
+    uint8_t                 bytes[IVL_CRTP_BYTES_MAX];
+    const size_t            n = ivl_crtp_bytes(packet, bytes);
+    (void)context;
+    assert((n >= 1u) && (n <= sizeof bytes));
+    for (size_t i = 0; i < n; i++)
+    {
+        sum = (uint8_t)(sum + bytes[i]);
+    }
+    n_sent++;
+}
+
+static void check_blocks(void)
+{
+    unsigned n = 0;
+    for (int i = 0; i < IVL_CRTP_BLOCKS; i++)
+    {
+        const ivl_crtp_block_t *b = &server.logs.block[i];
+        n += b->used ? b->n : 0u;
+        assert(!b->used || (b->n_bytes <= IVL_CRTP_LOG_BYTES));
+    }
+    assert((n == server.logs.n_variables) && (n <= IVL_CRTP_LOG_VARIABLES));
+}
+
+// a request has at most two answers: its own, and one that had been held back; or those that a log block adds
+static void play_datagram(const uint8_t *bytes, size_t size)
+{
+    // on the heap and no longer than it is, so that a read beyond its end is seen
+    uint8_t *copy = malloc(size + (size == 0u));
+    assert(copy != NULL);
+    for (size_t i = 0; i < size; i++)
+    {
+        copy[i] = bytes[i];
+    }
+    n_sent = 0;
+    ivl_crtp_receive(&server, copy, size);
+    assert(n_sent <= 3u);
+    free(copy);
+}
+
+static unsigned play_steps(unsigned wanted, unsigned left)
+{
+    const unsigned n = (wanted < left) ? wanted : left;
+    const uint64_t before_ms = ivl_crtp_time_ms(&server);
+    for (unsigned i = 0; i < n; i++)
+    {
+        ivl_crtp_step(&server);
+    }
+    assert(ivl_crtp_time_ms(&server) == before_ms + n);
+    return left - n;
+}
+
+static void play(const uint8_t *data, size_t size)
+{
+    unsigned steps_left = STEPS_MAX;
+    for (size_t at = 0; at < size;)
+    {
+        const uint8_t op = data[at++];
+        const size_t  wanted = (op < 0x80u) ? op & 0x3fu : 0u;
+        const size_t  n = (wanted < size - at) ? wanted : size - at;
+        char          reply[IVL_CRTP_CONTROL_BYTES];
+        if (op < 0x40u)
+        {
+            play_datagram(data + at, n);
+        }
+        else if (op < 0x80u)
+        {
+            ivl_crtp_control(&server, (const char *)data + at, n, reply);
+        }
+        else if (op < 0xc0u)
+        {
+            steps_left = play_steps((op & 0x3fu) + 1u, steps_left);
+        }
+        else
+        {
+            ivl_crtp_link(&server, (op & 1u) != 0u);
+        }
+        at += n;
+        check_blocks();
+    }
+}
+
+static void fail(const char *error)
+{
+    fprintf(stderr, "fuzz_crtp: %s\n", error);
+    exit(2);
+}
+
+static void open_vehicle(void)
+{
+    char error[200];
+    cf = ivl_cf_open(model, 1, error, sizeof error);
+    if (cf == NULL)
+    {
+        fail(error);
+    }
+}
+
+// The tables are made once, since their making would take most of the time; what an input can change is put back before the next.
+int LLVMFuzzerInitialize(int *argc, char ***argv)
+{
+    static const ivl_crtp_host_t HOST = {.send = look_at};
+    char                         error[400];
+    const char                  *path = getenv("IVL_FUZZ_MODEL");
+    (void)argc;
+    (void)argv;
+    if (path == NULL)
+    {
+        fail("IVL_FUZZ_MODEL must name a model file (ivl sil --write-model FILE)");
+    }
+    model = ivl_crtp_model_read(path, error, sizeof error);
+    if (model == NULL)
+    {
+        fail(error);
+    }
+    open_vehicle();
+    if (!ivl_crtp_open(&server, cf, &HOST, error, sizeof error))
+    {
+        fail(error);
+    }
+    fresh = server;
+    fresh_state = calloc(server.params.toc.n, sizeof *fresh_state);
+    assert(fresh_state != NULL);
+    memcpy(fresh_state, server.params.state, server.params.toc.n * sizeof *fresh_state);
+    return 0;
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    ivl_cf_close(cf);
+    open_vehicle();
+    server = fresh;
+    server.cf = cf;
+    memcpy(server.params.state, fresh_state, server.params.toc.n * sizeof *fresh_state);
+    ivl_crtp_link(&server, true);
+    play(data, size);
+    return 0;
+}
