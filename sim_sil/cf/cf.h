@@ -84,7 +84,7 @@ typedef struct
 const ivl_cf_param_t *ivl_cf_params(const ivl_cf_t *cf, size_t *n);
 const ivl_cf_log_t   *ivl_cf_logs(const ivl_cf_t *cf, size_t *n);
 
-/// Bring the values behind the log table up to date; before log variables are sampled.  Cheap if nothing has happened since.
+/// Bring the values behind the log table up to date; before log variables are sampled.
 void ivl_cf_logs_refresh(ivl_cf_t *cf);
 
 /// Parameters that the vehicle itself has changed since the last call, one a call.  @return false if there are no more
@@ -161,10 +161,11 @@ bool ivl_cf_set_manual(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawr
 bool ivl_cf_set_full_state(ivl_cf_t *cf, const float p_W_m[3], const float v_W_mps[3], const float a_W_mps2[3], const float q_WB[4],
                            const float w_B_radps[3]);
 
-/// Hand back to the high-level commander after so long.
+/// Hand back to the high-level commander, at once: as in the stock firmware, remain_ms changes nothing.
 void ivl_cf_notify_stop(ivl_cf_t *cf, uint32_t remain_ms);
 
-// ---- high-level commander.  @return 0, or an errno: EBUSY 16 when the vehicle cannot fly, EINVAL 22 for values that make no sense
+// ---- high-level commander.  @return 0, or an errno: EBUSY 16 when the vehicle cannot fly, EINVAL 22 for values that make no sense, EPERM 1
+// for a take-off in flight and a landing on the floor
 
 int ivl_cf_hl_takeoff(ivl_cf_t *cf, float height_m, float yaw_rad, bool use_current_yaw, float duration_s);
 int ivl_cf_hl_land(ivl_cf_t *cf, float height_m, float yaw_rad, bool use_current_yaw, float duration_s);

@@ -52,16 +52,16 @@ static void numbers_written(void)
 
 static void controller_written(void)
 {
-    static uint8_t before = IVL_CF_CONTROLLER_APP;
-    if (THE.set.controller != IVL_CF_CONTROLLER_STOCK)
+    const bool was_stock = THE.runs_stock;
+    THE.runs_stock = THE.set.controller == IVL_CF_CONTROLLER_STOCK;
+    if (!THE.runs_stock)
     {
         THE.set.controller = IVL_CF_CONTROLLER_APP;
-        if (before == IVL_CF_CONTROLLER_STOCK)
+        if (was_stock)
         {
             app_start_core(&ivl_app);
         }
     }
-    before = THE.set.controller;
     ivl_cf_stock_reset(&THE.stock);
 }
 
@@ -236,8 +236,6 @@ static const float PWM_FULL = 65535.0f;
 static struct
 {
     LOGS(MEMBER)
-    uint64_t t_ms;  ///< when these were
-    bool     given;
 } values;
 
 #define TYPE_OF(member)                                                                                                                    \

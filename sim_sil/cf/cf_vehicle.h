@@ -68,6 +68,7 @@ struct ivl_cf
     uint64_t            n_reset;
     bool                grounded;  ///< rests on the floor
     bool                link_up;
+    bool                runs_stock;  ///< the stock controller is selected
     uint64_t            app_wake_ms;
     ivl_cf_settings_t   set;
     ivl_cf_supervisor_t supervisor;
