@@ -135,7 +135,7 @@ class SweepView {
     const own = this.trials.filter((trial) => trial.cell === cell.id);
     table($("#trials-table"), ["trial", "rate", "clean", "RREV_c, 1/s", "M_yd, N mm", "best landing"], own.map((t) => [String(t.trial), percent(t.rate), percent(t.clean),
       `${t.mu_rrev.toFixed(2)} ± ${t.sigma_rrev.toFixed(2)}`, `${t.mu_moment.toFixed(2)} ± ${t.sigma_moment.toFixed(2)}`, replayButtons(this.replay, t.landing, `the best landing of trial ${t.trial}`)]));
-    const others = this.cells.filter((c) => this.sameApproach(c, cell));
+    const others = this.cells.filter((c) => this.sameApproach(c, cell)).sort((a, b) => a.gear - b.gear);
     table($("#gears-table"), ["gear at this approach", "rate", "best landing"], others.map((c) => [readable(sweep.gears[c.gear]), percent(c.rate), replayButtons(this.replay, c.landing, `the best landing of ${readable(sweep.gears[c.gear])}`)]));
     if (cell.landing >= 0) this.replay.show(0, cell.landing);
     if (!this.replay.panes[1].landing) this.showContrast(others, cell);

@@ -23,12 +23,12 @@ function widths(centres) {
 function polarFigure(sweep, cells, gears) {
   const columns = Math.min(3, gears.length), rows = Math.ceil(gears.length / columns);
   const dv = widths(sweep.speeds), dphi = widths(sweep.angles);
-  const layout = { font: FONT, margin: { l: 8, r: 8, t: 22, b: 8 }, showlegend: false, annotations: [], height: 250 * rows,
-    coloraxis: { cmin: 0, cmax: 1, colorscale: RATE_SCALE, colorbar: { title: { text: "landing rate", side: "right" }, thickness: 12, tickformat: ".0%", len: 0.8 } } };
+  const layout = { font: FONT, margin: { l: 8, r: 8, t: 22, b: 62 }, showlegend: false, annotations: [], height: 265 * rows + 62,
+    coloraxis: { cmin: 0, cmax: 1, colorscale: RATE_SCALE, colorbar: { orientation: "h", y: -0.01, yanchor: "top", title: { text: "landing rate, mean over the trials of a cell", side: "bottom", font: { size: 12 } }, thickness: 10, tickformat: ".0%", len: 0.7 } } };
   const traces = gears.map((gear, k) => {
     const own = cells.filter((cell) => cell.gear === gear), name = `polar${k ? k + 1 : ""}`;
     const [x0, y1] = [(k % columns) / columns, 1 - Math.floor(k / columns) / rows];
-    layout[name] = polarAxes([x0 + 0.025, x0 + 1 / columns - 0.035], [y1 - 1 / rows + 0.09, y1 - 0.05], sweep);
+    layout[name] = polarAxes([x0 + 0.02, x0 + 1 / columns - 0.03], [y1 - 1 / rows + 0.17 / rows, y1 - 0.09 / rows], sweep);
     layout.annotations.push({ text: `<b>${readable(sweep.gears[gear])}</b>`, x: x0 + 0.5 / columns, y: y1 + 0.012, xref: "paper", yref: "paper", xanchor: "center", yanchor: "top", showarrow: false });
     return { type: "barpolar", subplot: name, customdata: own.map((cell) => cell.id),
       r: own.map((cell) => dv[cell.speed]), base: own.map((cell) => sweep.speeds[cell.speed] - dv[cell.speed] / 2),
@@ -42,7 +42,8 @@ function polarFigure(sweep, cells, gears) {
 
 function polarAxes(x, y, sweep) {
   const top = sweep.speeds[sweep.speeds.length - 1] + widths(sweep.speeds)[sweep.speeds.length - 1] / 2;
-  return { domain: { x, y }, sector: [0, 90], bgcolor: "#f2f4f7",
+  const n = sweep.angles.length - 1, last = sweep.angles[n] + widths(sweep.angles)[n] / 2;  // the last sector whole
+  return { domain: { x, y }, sector: [0, Math.max(90, last)], bgcolor: "#f2f4f7",
     radialaxis: { range: [0, top], angle: 0, tickangle: 0, title: { text: "V (m/s)", font: { size: 10 } }, tickfont: { size: 10 }, nticks: 5, gridcolor: "rgba(0,0,0,0.08)" },
     angularaxis: { tickvals: [0, 30, 60, 90], ticksuffix: "°", tickfont: { size: 10 }, gridcolor: "rgba(0,0,0,0.08)" } };
 }
@@ -62,11 +63,11 @@ function regionFigure(points, colour) {
   const byRate = colour === "rate";
   const trace = { type: "scatter3d", mode: "markers", x: points.rrev, y: points.ofY, z: points.d, customdata: points.cell, text: points.text,
     hovertemplate: "%{text}<br>RREV %{x:.2f} 1/s, OF_y %{y:.2f} rad/s, d %{z:.3f} m<extra></extra>",
-    marker: { size: 3.2, color: byRate ? points.rate : points.moment, colorscale: byRate ? RATE_SCALE : MOMENT_SCALE, cmin: byRate ? 0 : undefined, cmax: byRate ? 1 : undefined,
+    marker: { size: 2.4, color: byRate ? points.rate : points.moment, colorscale: byRate ? RATE_SCALE : MOMENT_SCALE, cmin: byRate ? 0 : undefined, cmax: byRate ? 1 : undefined,
       colorbar: { title: { text: byRate ? "landing rate" : "M_yd (N mm)", side: "right" }, thickness: 12, len: 0.7, tickformat: byRate ? ".0%" : undefined } } };
   const axis = (text) => ({ title: { text, font: { size: 12 } }, backgroundcolor: "#f7f8fa", gridcolor: "#dfe4ea", showbackground: true });
-  const layout = { font: FONT, height: 460, margin: { l: 0, r: 0, t: 6, b: 0 }, uirevision: "keep",
-    scene: { xaxis: axis("RREV (1/s)"), yaxis: axis("OF_y (rad/s)"), zaxis: axis("d (m)"), camera: { eye: { x: 1.5, y: -1.5, z: 0.9 } }, aspectmode: "cube" } };
+  const layout = { font: FONT, height: 520, margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "keep",
+    scene: { xaxis: axis("RREV (1/s)"), yaxis: axis("OF_y (rad/s)"), zaxis: axis("d (m)"), camera: { eye: { x: 1.25, y: -1.35, z: 0.6 }, center: { x: 0, y: 0, z: -0.12 } }, aspectmode: "manual", aspectratio: { x: 1.15, y: 1.15, z: 0.85 } } };
   return { traces: [trace], layout };
 }
 

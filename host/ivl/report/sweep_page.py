@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
 from ivl import reward
-from ivl.analysis.rates import CLEAN_RATE, RATE, SOLVED_RATE, cell_rates
+from ivl.analysis.claims import evaluate
+from ivl.analysis.rates import CLEAN_RATE, RATE, SOLVED_RATE, cell_rates, rollouts_to_rate
 from ivl.errors import StoreError
 from ivl.landing import LandingSpec
 from ivl.report import replay
@@ -18,6 +19,8 @@ from ivl.sweep import store
 from ivl.sweep.config import Sweep, load_sweep
 from ivl.sweep.schema import CELL, TRIAL_KEY
 
+CAMPAIGN_GEARS, CAMPAIGN_APPROACHES = 6, 100
+"""A run with fewer gears or approaches says nothing about the paper's claims (which rest on 6 and 240)."""
 _PLACES = {"gear": "gears", "speed_mps": "speeds", "angle_deg": "angles"}
 _PARAMETERS = {"rrev": "rrev_c_per_s", "moment": "moment_y_Nmm"}
 
@@ -37,7 +40,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
         "subtitle": sweep.doc,
         "facts": [*_facts(sweep, trials, cells), album.fact()],
         "manifest": flatten(manifest),
-        "claims": None,
+        "claims": _claims(folder, trials, cells),
         "scale": replay.SCALE,
         "geometry": album.geometry,
         "landings": album.landings,
@@ -120,6 +123,17 @@ def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list
         [f"Cells with a trial of {100 * SOLVED_RATE:.0f} % or more", f"{n_solved} of {len(cells)}"],
         ["Seed", str(sweep.seed)],
     ]
+
+
+def _claims(folder: Path, trials: pd.DataFrame, cells: pd.DataFrame) -> dict[str, Any] | None:
+    """The paper's claims tried on this run; None for a run that is not nearly the paper's campaign."""
+    approaches = cells.groupby("gear", observed=True).size()
+    if len(approaches) < CAMPAIGN_GEARS or approaches.min() < CAMPAIGN_APPROACHES:
+        return None
+    needed = rollouts_to_rate(store.read_episodes(folder)).astype({name: trials[name].dtype for name in CELL})
+    found = evaluate(trials.merge(needed, on=list(TRIAL_KEY), how="left"))
+    head = ["", "claim of the paper", "verdict", "what was found"]
+    return {"head": head, "rows": [[str(c.number), c.text, c.verdict, c.finding] for c in found]}
 
 
 def _finished(sweep: Sweep, trials: pd.DataFrame) -> str:
