@@ -117,7 +117,7 @@ def _describe(run: Path) -> dict[str, Any]:
 
 
 def _write(table: pa.Table, path: Path) -> None:
-    pq.write_table(table, path, compression="zstd", compression_level=19)
+    compact.write(table, path)
     print(f"{path}: {table.num_rows} rows, {path.stat().st_size / 1000:.0f} kB")
 
 

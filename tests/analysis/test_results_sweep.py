@@ -9,7 +9,6 @@ from types import ModuleType
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 
 from ivl import native
@@ -81,7 +80,7 @@ def test_numbers_follow_the_data(campaign: pd.DataFrame) -> None:
 def write_data(campaign: pd.DataFrame, path: Path) -> None:
     no_episodes = pd.DataFrame({f.name: [] for f in schema.schema(schema.EPISODES)})
     path.mkdir()
-    pq.write_table(compact.pack(campaign[campaign["vehicle"] == "habas2021"], no_episodes), path / "trials.parquet")
+    compact.write(compact.pack(campaign[campaign["vehicle"] == "habas2021"], no_episodes), path / "trials.parquet")
 
 
 @pytest.mark.usefixtures("quick")

@@ -40,7 +40,7 @@ def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
         raise ConfigError("the run kept no episodes: convergence cannot be drawn")
     episodes = _nearest(data.episodes)
     learners = [setup["learner"] for setup in data.setups("learner")]
-    figure = style.new_figure(3.1 * len(learners) + 0.6, 5.4)
+    figure = style.new_figure(max(4.8, 3.1 * len(learners) + 0.6), 5.4)
     axes = figure.subplots(3, len(learners), sharex=True, sharey="row", squeeze=False, height_ratios=(3, 3, 2))
     for column, learner in zip(axes.T, learners, strict=True):
         own = episodes[episodes["learner"] == learner]
