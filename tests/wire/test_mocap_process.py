@@ -82,9 +82,8 @@ def cameras() -> Iterator[Cameras]:
 
 def config(**values: Any) -> MocapConfig:
     # a busy machine delays frames: what is slow there is not lost
-    return MocapConfig(
-        **{"system": "simulator", "body": BODY, "lost_s": 0.5, "frozen_s": 0.5, "settle_s": 0.1, **values}
-    )
+    limits = {"lost_s": 0.4, "frozen_s": 0.4, "settle_s": 0.5}
+    return MocapConfig(**{"system": "simulator", "body": BODY, **limits, **values})
 
 
 def test_optitrack_client_brings_poses_to_the_vehicle(cameras: Cameras) -> None:

@@ -261,6 +261,7 @@ def test_every_example_is_good() -> None:
         ("system: kinect\nbody: cf\n", "system: value 'kinect'"),
         ("system: mock\nbody: ''\n", "body: value ''"),
         ("system: mock\nbody: cf\nlost_s: 5.0\n", "lost_s: value 5.0: .*less than or equal to 1"),
+        ("system: mock\nbody: cf\nsettle_s: 0.1\n", r"settle_s 0\.1 must be above lost_s 0\.1"),
         ("system: mock\nbody: cf\nsend_hz: .nan\n", "send_hz: value nan"),
         ("system: mock\nbody: cf\nsend_hz: 1e2\n", "YAML reads this as text"),
         ("system: mock\nbody: cf\nrate: 100\n", "rate: unknown key"),

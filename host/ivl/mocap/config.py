@@ -36,7 +36,7 @@ class MocapConfig(BaseModel):
     frozen_s: Number | None = Field(
         default=0.1, ge=0.02, le=1, description="the same pose for so long: frozen; null: not looked for"
     )
-    settle_s: Number = Field(default=0.2, ge=0, le=5, description="poses agree for so long after a loss: good again")
+    settle_s: Number = Field(default=0.2, gt=0, le=5, description="poses agree for so long after a loss: good again")
     speed_mps_max: Number = Field(default=10.0, ge=0.5, le=50, description="faster is a jump")
     rate_radps_max: Number = Field(default=60.0, ge=1, le=200, description="faster is a jump")
 
@@ -48,6 +48,14 @@ class MocapConfig(BaseModel):
         if (self.system in SYSTEMS_WITH_HOST) != bool(self.host):
             needs = "needs a host" if self.system in SYSTEMS_WITH_HOST else "has no host"
             raise ValueError(f"system {self.system} {needs} (host: value {self.host!r})")
+        return self
+
+    @model_validator(mode="after")
+    def _tells_jumps(self) -> Self:
+        if not self.settle_s > self.lost_s:
+            raise ValueError(
+                f"settle_s {self.settle_s:g} must be above lost_s {self.lost_s:g}: a jump would be followed untold"
+            )
         return self
 
     def vehicle_params(self) -> dict[str, float]:

@@ -181,7 +181,7 @@ class Watch:
         self.counts.n_jumps += is_fresh
         is_jump = is_fresh or (run is not None and run.is_jump)
         self._run = _Run(t_s, t_s, pose, is_jump)
-        return self._config.settle_s == 0.0
+        return False
 
     def _is_plausible(self, before: Pose, after: Pose, span_s: float) -> bool:
         distance_m = math.dist(before.p_W_m, after.p_W_m)

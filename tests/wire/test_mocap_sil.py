@@ -1,0 +1,189 @@
+"""The whole way of a pose: software vehicle, cameras, a real client in its process, checks, and back into the vehicle.
+
+It flies by these poses and by nothing else.
+"""
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from ivl import cli
+from ivl.links import sil
+from ivl.links.packets import Phase, Request
+from ivl.links.tables import Session
+from ivl.links.vehicle import Command, Vehicle
+from ivl.mocap.config import MocapConfig
+from ivl.mocap.guard import LossGuard
+from ivl.mocap.simulated import SimulatedRoom
+from ivl.mocap.stream import Mocap
+from ivl.mocap.watch import Status
+from ivl.silproc import SilProcess
+from ivl.world import World
+
+# a busy machine delays frames: what is slow there is not lost
+CONFIG = MocapConfig(system="simulator", body="cf21", lost_s=0.3, frozen_s=0.3, settle_s=0.4)
+# the vehicle itself may fly on its last pose for longer than that, so that it is the host who notices
+LIMITS = {"ivl.stale_s_max": 1.0, "ivl.p_sigma_max": 10.0, "ivl.abort_hover_s": 0.3, "ivl.land_speed": 1.5}
+DEADLINE_S = 20.0
+
+
+class Lab:
+    """A software vehicle that hovers by motion capture."""
+
+    def __init__(self, process: SilProcess, session: Session) -> None:
+        self.process, self.session, self.vehicle = process, session, Vehicle(session)
+        self.room = SimulatedRoom(session, CONFIG.body)
+        self.mocap = Mocap(CONFIG, session.cf.extpos, self.room.request(CONFIG))
+        self.asked: list[str] = []
+        self.phases: list[Phase] = []
+        sil.reset(self.vehicle)
+        self.vehicle.configure(World("habas2021", "wide_short", "as_simulated"))
+        session.write(LIMITS)
+        session.write({"ivl.commit": 77})
+        self.wait(lambda: self.vehicle.config.values.get("ivl.cfg_seq") == 77, "limits")
+        assert self.vehicle.config.values["ivl.cfg_status"] == 0
+        self.mocap.start()
+
+    def close(self) -> None:
+        self.mocap.close()
+        self.room.close()
+
+    def wait(self, condition: Callable[[], Any], what: str) -> None:
+        def seen() -> bool:
+            if not self.phases or self.phases[-1] != self.vehicle.phase:
+                self.phases.append(self.vehicle.phase)
+            return bool(condition())
+
+        self.vehicle.wait(seen, DEADLINE_S, what, 0.02)
+
+    def hover(self) -> LossGuard:
+        """Reset into the air and hover under the flight core; returns the guard of this flight."""
+        self.mocap.guard = None
+        self.vehicle.command = Command(Request.IDLE)
+        # the vehicle was put elsewhere: only when the cameras have followed may it fly by them
+        self.session.write({"sil.pose_source": 0})
+        sil.reset(self.vehicle)
+        self.wait(self.is_tracked, "cameras that have followed the reset")
+        self.session.write({"sil.pose_source": 1})
+        self.vehicle.pause(0.3)
+        self.vehicle.put_policy(4.8, 8.0)
+        self.asked.clear()
+        guard = self.mocap.guard = LossGuard(lambda: self.vehicle.phase, self.abort)
+        self.vehicle.ask_for(Command(Request.HOVER, self.vehicle.position_W_m), (Phase.READY,), 5.0)
+        self.vehicle.pause(0.3)
+        self.phases.clear()
+        return guard
+
+    def is_tracked(self) -> bool:
+        state, z_m = self.mocap.state(), self.process.get("simTruth.z")
+        return state.status is Status.GOOD and abs(state.pose.p_W_m[2] - z_m) < 0.05
+
+    def abort(self, why: str) -> None:
+        self.asked.append(why)
+        self.vehicle.command = Command(Request.ABORT)
+
+    def approach(self, speed_mps: float) -> None:
+        point = self.vehicle.position_W_m
+        self.vehicle.command = Command(Request.APPROACH, point, speed_mps, math.pi / 2)
+
+    def mend(self) -> None:
+        self.room.frozen = self.room.occluded = self.room.silent = False
+        self.room.shift_m = (0.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def lab() -> Iterator[Lab]:
+    with SilProcess(World("habas2021", "wide_short", "as_simulated")) as process, Session(process.uri) as session:
+        lab = Lab(process, session)
+        yield lab
+        lab.close()
+
+
+def test_landing_flown_by_motion_capture(lab: Lab) -> None:
+    guard = lab.hover()
+    lab.approach(2.5)
+    lab.wait(lambda: lab.phases[-1] == Phase.DONE, "end of the landing")
+    assert Phase.FLIP in lab.phases
+    snapshot = lab.vehicle.snapshot()
+    assert snapshot.rrev_per_s >= 4.8
+    assert snapshot.d_ceil_m == pytest.approx(snapshot.vz_mps / snapshot.rrev_per_s, rel=0.01)
+    assert snapshot.vz_mps == pytest.approx(2.5, abs=0.4)
+    assert lab.asked == []
+    assert guard.n_aborts == 0
+    state = lab.mocap.state()
+    assert state.status is Status.GOOD
+    # what was sent came out of the vehicle's log, through cameras and client, and is what the vehicle took
+    assert 0 < lab.process.get("sil.n_pose") <= state.n_sent
+    for axis, value in zip("xyz", state.pose.p_W_m, strict=True):
+        assert value == pytest.approx(lab.process.get(f"simTruth.{axis}"), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("fault", "value", "text"),
+    [
+        ("frozen", True, "has not changed by a bit"),
+        ("occluded", True, "cf21 is not seen"),
+        ("silent", True, "no frame"),
+        ("shift_m", (0.0, 7.0, 0.0), "cf21 has jumped"),
+    ],
+)
+def test_loss_in_hover_aborts(lab: Lab, fault: str, value: Any, text: str) -> None:
+    guard = lab.hover()
+    setattr(lab.room, fault, value)
+    lab.wait(lambda: lab.phases[-1] == Phase.ABORTED, "abort")
+    lab.mend()
+    assert text in lab.asked[0]
+    assert guard.n_aborts == 1
+    assert lab.phases == [Phase.READY, Phase.ABORTED]
+
+
+@pytest.mark.parametrize("fault", ["frozen", "occluded"])
+def test_loss_in_the_approach_aborts(lab: Lab, fault: str) -> None:
+    guard = lab.hover()
+    lab.approach(0.8)
+    lab.wait(lambda: lab.phases[-1] == Phase.APPROACH, "approach")
+    setattr(lab.room, fault, True)
+    lab.wait(lambda: lab.phases[-1] == Phase.ABORTED, "abort")
+    lab.mend()
+    assert guard.n_aborts == 1
+    assert Phase.FLIP not in lab.phases
+
+
+def test_vehicle_comes_down_by_poses_that_are_back_in_time(lab: Lab) -> None:
+    lab.hover()
+    lab.room.occluded = True
+    lab.wait(lambda: lab.phases[-1] == Phase.ABORTED, "abort")
+    lab.mend()
+    lab.wait(lambda: lab.vehicle.rule == "landed", "landing")
+    assert lab.process.get("simTruth.z") == pytest.approx(0.0, abs=0.1)
+
+
+def test_loss_in_the_flip_interrupts_nothing(lab: Lab) -> None:
+    guard = lab.hover()
+    lab.approach(2.5)
+    lab.wait(lambda: lab.vehicle.phase >= Phase.FLIP, "flip")
+    lab.room.occluded = True
+    lab.wait(lambda: lab.phases[-1] == Phase.DONE, "end of the landing")
+    ended_s = time.monotonic()
+    lab.wait(lambda: time.monotonic() - ended_s > 0.2, "a while")
+    lab.mend()
+    assert lab.asked == []
+    assert (guard.n_aborts, guard.n_ignored) == (0, 1)
+    assert Phase.ABORTED not in lab.phases
+    assert lab.vehicle.command.request is Request.APPROACH
+    assert Phase.COAST in lab.phases
+
+
+def test_program_tracks_a_software_vehicle(capsys: pytest.CaptureFixture[str]) -> None:
+    with SilProcess(World("crazyflie21")) as process:
+        cli.run(["mocap", "--config", "simulator", "--uri", process.uri, "--seconds", "1.5", "--json"])
+        report = json.loads(capsys.readouterr().out)
+        assert report["status"] == "good"
+        assert report["n_sent"] > 20
+        assert process.get("sil.n_pose") == pytest.approx(report["n_sent"], abs=20)
+        assert process.get("stabilizer.estimator") == 2
+        assert process.get("locSrv.extPosStdDev") == pytest.approx(0.01)
