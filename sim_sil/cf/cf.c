@@ -11,6 +11,7 @@
 ivl_cf_t ivl_cf_the;
 
 static const float    ACC_FILTER_HZ = 30.0f;
+static const float    SIGMA_M_MIN = 1.0e-3f, SIGMA_M_MAX = 100.0f;
 static const uint32_t RANGE_MS = 100;  // period of the distance sensor
 static const double   RANGE_M_MAX = 4.0;
 static const uint16_t RANGE_NONE_MM = 32767;
@@ -156,14 +157,16 @@ static void look_up(ivl_cf_t *cf)
     }
 }
 
-/// The estimator is as certain as its sensors are, and less and less without them.
+/// With poses from outside the estimator is as certain as they are, and less and less without them.  The simulated motion capture claims to be
+/// certain whatever its noise: in the process of the host no rule asks, and here none must.
 static void judge_estimate(ivl_cf_t *cf)
 {
-    const float noise_m = (float)cf->model.raw.sense_position_noise_m, floor_m = 1.0e-3f, drift_mps = 0.5f;
-    const bool  outside = cf->set.pose_source != 0u;
+    const float fresh_s = 0.1f, drift_mps = 0.5f;
     const float age_s = (float)(ivl_cf_time_us(cf) - cf->sensed.t_pose_us) * APP_S_PER_US;
-    const float sigma_m = (outside ? cf->set.ext_pos_sigma_m : noise_m) + floor_m + ((age_s > 0.1f) ? drift_mps * age_s : 0.0f);
-    cf->variance_m2 = ivl_clamp(sigma_m, floor_m, 100.0f) * ivl_clamp(sigma_m, floor_m, 100.0f);
+    const float drift_m = (age_s > fresh_s) ? drift_mps * age_s : 0.0f;
+    const float sigma_m = (cf->set.pose_source != 0u) ? cf->set.ext_pos_sigma_m + drift_m : SIGMA_M_MIN;
+    const float told_m = ivl_clamp(sigma_m, SIGMA_M_MIN, SIGMA_M_MAX);
+    cf->variance_m2 = told_m * told_m;
 }
 
 static void draw_power(ivl_cf_t *cf)

@@ -109,7 +109,7 @@ const ivl_cf_memory_t *ivl_cf_memories(const ivl_cf_t *cf, size_t *n);
 typedef struct
 {
     uint32_t magic;       ///< IVL_CF_OUTCOME_MAGIC
-    uint32_t episode;     ///< number of the landing: as log sil.episode when log sil.ended became 1; 0: none yet
+    uint32_t episode;     ///< number of the landing: log sil.episode while log sil.ended is 1; 0: none yet
     uint32_t size;        ///< of the outcome behind the header
     uint32_t policy_seq;  ///< of the policy that was flown
 } ivl_cf_outcome_header_t;

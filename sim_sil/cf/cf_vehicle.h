@@ -49,7 +49,7 @@ typedef struct
 {
     uint32_t                number;   ///< begun since boot
     bool                    running;  ///< the last one is not over
-    uint8_t                 ended;    ///< the outcome below is that of landing `number`
+    uint8_t                 ended;    ///< it is over and its outcome stands below; a reset clears this
     uint32_t                policy_seq;
     ivl_sim_outcome_t       now;     ///< of the one that runs
     ivl_cf_outcome_header_t header;  ///< of the last that has ended

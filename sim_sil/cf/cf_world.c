@@ -60,6 +60,7 @@ void ivl_cf_world_reset(ivl_cf_t *cf)
     const uint32_t   now_ms = ivl_cf_now_ms(cf);
     const ivl_vec3_t p = {cf->set.start_x_m, cf->set.start_y_m, cf->set.start_z_m};
     cf->episode.running = false;
+    cf->episode.ended = 0;
     start(cf, (double)cf->set.start_z_m);
     forget_requests(&ivl_app);
     ivl_cf_supervisor_fly(&cf->supervisor, now_ms);
