@@ -50,12 +50,12 @@ function polarAxes(x, y, sweep) {
 
 // Outline of the chosen cell in all polar plots: that of its gear strong, the same approach of other gears weak.
 function outlineCell(div, cells, chosen) {
-  div.data.forEach((trace, k) => {
-    const own = trace.customdata.map((id) => cells[id]);
-    const same = own.map((cell) => cell.speed === chosen.speed && cell.angle === chosen.angle);
-    const strong = own.map((cell) => cell.id === chosen.id);
-    Plotly.restyle(div, { "marker.line.width": [own.map((_, i) => (strong[i] ? 3.5 : same[i] ? 2 : 0.4))], "marker.line.color": [own.map((_, i) => (strong[i] ? VERMILION : same[i] ? "#e79a6a" : "#ffffff"))] }, [k]);
-  });
+  const lines = div.data.map((trace) => trace.customdata.map((id) => {
+    if (id === chosen.id) return [3.5, VERMILION];
+    return cells[id].speed === chosen.speed && cells[id].angle === chosen.angle ? [2, "#e79a6a"] : [0.4, "#ffffff"];
+  }));
+  const part = (i) => lines.map((own) => own.map((line) => line[i]));
+  return Plotly.restyle(div, { "marker.line.width": part(0), "marker.line.color": part(1) }, lines.map((_, k) => k));
 }
 
 // Trigger states of the trials in (RREV, OF_y, d), coloured by landing rate or moment.
