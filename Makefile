@@ -9,6 +9,7 @@ CLANG      ?= clang-14
 FLAVOUR    ?= release
 JOBS       ?= $(shell getconf _NPROCESSORS_ONLN)
 EXPERIMENT ?= experiments/paper_vertical.yaml
+SWEEP      ?= sweeps/smoke.yaml
 FUZZ_RUNS  ?= 5000000
 ifeq ($(origin CC),default)
 CC := $(if $(shell command -v gcc),gcc,cc)
@@ -54,6 +55,11 @@ sil: setup build ## start the software vehicle on udp://127.0.0.1:19850 (VEHICLE
 learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for another)
 	$(say) 'learn: $(EXPERIMENT)'
 	@$(BIN)/ivl learn $(EXPERIMENT)
+
+.PHONY: sweep
+sweep: setup build ## a few cells of the paper's campaign (SWEEP=sweeps/paper.yaml for all of it)
+	$(say) 'sweep: $(SWEEP)'
+	@$(BIN)/ivl sweep $(SWEEP)
 
 .PHONY: figs
 figs: setup build ## the paper's figures 4 to 9 from RUN=... (a sweep's run folder, or several)
@@ -113,7 +119,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 .PHONY: test
-test: lint test-c san golden test-py test-wire test-sil test-physics test-mujoco test-analysis test-report pil sizes-diff ## everything below, set-up and compilers included
+test: lint test-c san golden test-py test-wire test-sil test-physics test-mujoco test-analysis test-sweep test-report pil sizes-diff ## everything below, set-up and compilers included
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
@@ -189,6 +195,11 @@ step-study: setup-dev build ## ten thousand landings with shorter and shorter st
 test-mujoco: setup-dev build ## landings compared with an independent engine
 	$(say) 'test-mujoco: pytest tests/mujoco'
 	@$(BIN)/python -m pytest tests/mujoco $(PYTEST_ARGS)
+
+.PHONY: test-sweep
+test-sweep: setup-dev build ## sweeps on real processes: workers, clients and cells that fail, the same tables every time
+	$(say) 'test-sweep: pytest tests/sweep'
+	@$(BIN)/python -m pytest tests/sweep $(PYTEST_ARGS)
 
 .PHONY: test-analysis
 test-analysis: setup-dev build ## analysis and figures of campaigns, on tables with known answers

@@ -78,3 +78,31 @@ def test_repeated_points_and_constant_values_are_survived(y: np.ndarray) -> None
     mean, sd = GaussianProcess(x, y, hyper).predict(np.array([[0.5, 0.5], [0.0, 1.0]]))
     assert np.isfinite(mean).all()
     assert np.isfinite(sd).all()
+
+
+def test_the_safest_point_is_that_of_exact_predictions() -> None:
+    x, y = data(50)
+    at = np.random.default_rng(1).uniform(size=(300, 2))
+    for lengths in ([0.2, 0.3], [0.02, 0.03], [3.0, 2.0]):
+        gp = GaussianProcess(x, y, Hyper(np.array(lengths), 0.05))
+        mean, sd = gp.predict(at)
+        value = mean - 0.5 * sd
+        assert value[gp.safest(at, 0.5)] == pytest.approx(value.max(), abs=1e-4)
+
+
+def test_fitted_values_are_the_mean_at_the_data() -> None:
+    x, y = data(90)
+    gp = GaussianProcess(x, y, HYPER)
+    assert gp.fitted == pytest.approx(gp.predict(x)[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("length", [1e-3, 0.02, 100.0])
+def test_very_short_and_very_long_lengths_equal_the_textbook_too(length: float) -> None:
+    x, y = data(90)
+    hyper = Hyper(np.array([length, length]), 0.05)
+    at = np.random.default_rng(1).uniform(size=(7, 2))
+    mean, covariance, likelihood = dense(x, y, at, hyper)
+    gp = GaussianProcess(x, y, hyper)
+    assert gp.predict(at)[0] == pytest.approx(mean, abs=1e-7)
+    assert gp.predict(at)[1] ** 2 == pytest.approx(np.diag(covariance), abs=1e-6)
+    assert log_likelihood(x, y, hyper) == pytest.approx(likelihood, rel=1e-6, abs=1e-9)

@@ -4,7 +4,8 @@ Every rollout counts for as long as it is remembered, failed ones too: they tell
 the start's spread, z = (theta - mu0) / sigma0, with y the returns shifted and scaled to mean 0 and variance 1:
 
     first episode     theta ~ N(mu0, diag sigma0^2), truncated to the bounds                             (1)
-    model             y = f(z) + noise, f a Gaussian process (see `ivl.learners.gp`), refitted after each episode
+    model             y = f(z) + noise, f a Gaussian process (see `ivl.learners.gp`), of all data after each episode;
+                      its lengths and noise ratio are fitted whenever the data have grown by `refit`
     later episodes    theta_n = argmax over the candidates of f_n, f_n a draw of the posterior           (2)
     recommended       argmax(mean(z) - caution sd(z))                                                    (3)
 
@@ -38,6 +39,7 @@ class BOOptions(Options):
     n_near: int = Field(default=300, ge=10, le=5000, description="candidates near what was best")
     n_elite: int = Field(default=20, ge=1, le=1000, description="policies that count as best")
     jitter: float = Field(default=0.25, gt=0, le=10, description="spread of the near candidates, in kernel lengths")
+    refit: float = Field(default=1.5, ge=1, le=10, description="growth of the data that calls for a new fit")
     memory: int = Field(default=400, ge=8, le=4000, description="latest rollouts that the model is made from")
 
     @model_validator(mode="after")
@@ -60,6 +62,7 @@ class BOLearner(Learner):
         self._box = self._scale(np.stack([self.lo, self.hi]))
         self._prior = Hyper(np.full(self.dim, self.options.length), self.options.noise)
         self._hyper = self._prior
+        self._n_fitted = 0  # rollouts that the last fit knew
         self._gp: GaussianProcess | None = None
         self._best = np.zeros(self.dim)
         self._spread = self.sigma0.copy()
@@ -75,7 +78,9 @@ class BOLearner(Learner):
     def _update(self, theta: FloatArray, rewards: FloatArray, _meta: Meta, /) -> None:
         self._x = np.vstack([self._x, self._scale(theta)])[-self.options.memory :]
         self._rewards = np.append(self._rewards, rewards)[-self.options.memory :]
-        self._hyper = fit(self._x, self._values(), self._prior, self._hyper, self.options.noise_min)
+        if self._n_told + rewards.size >= self.options.refit * self._n_fitted:
+            self._hyper = fit(self._x, self._values(), self._prior, self._hyper, self.options.noise_min)
+            self._n_fitted = self._n_told + rewards.size
         self._refresh()
 
     def _refresh(self) -> None:
@@ -91,7 +96,7 @@ class BOLearner(Learner):
 
     def _candidates(self, gp: GaussianProcess) -> FloatArray:
         uniform = self._uniform(self.options.n_uniform, self._rng)
-        elite = np.argsort(-gp.predict(self._x)[0], kind="stable")[: self.options.n_elite]
+        elite = np.argsort(-gp.fitted, kind="stable")[: self.options.n_elite]
         centers = np.vstack([self._x[elite], np.tile(self._best, (len(elite), 1))])
         near = self._cloud(centers[self._rng.integers(len(centers), size=self.options.n_near)], 1.0, self._rng)
         return np.vstack([uniform, near])
@@ -104,9 +109,9 @@ class BOLearner(Learner):
         rng = np.random.Generator(np.random.PCG64(self.seed))
         points = np.vstack([self._x, self._uniform(500, rng)])
         for halvings in range(_SEARCH_ROUNDS + 1):
-            mean, sd = gp.predict(points)
-            best = points[int(np.argmax(mean - self.options.caution * sd))]
-            points = np.vstack([best, self._cloud(np.tile(best, (150, 1)), 0.5**halvings, rng)])
+            best = points[gp.safest(points, self.options.caution)]
+            if halvings < _SEARCH_ROUNDS:
+                points = np.vstack([best, self._cloud(np.tile(best, (150, 1)), 0.5**halvings, rng)])
         return np.asarray(best)
 
     def _uniform(self, n: int, rng: np.random.Generator) -> FloatArray:
@@ -135,6 +140,7 @@ class BOLearner(Learner):
             "rewards": self._rewards.tolist(),
             "lengths": self._hyper.lengths.tolist(),
             "noise": self._hyper.noise,
+            "n_fitted": self._n_fitted,
             "spread": self._spread.tolist(),
         }
 
@@ -143,6 +149,7 @@ class BOLearner(Learner):
         self._x = np.array(state["z"], dtype=np.float64).reshape(-1, self.dim)
         self._rewards = np.array(state["rewards"], dtype=np.float64)
         self._hyper = Hyper(np.array(state["lengths"], dtype=np.float64), float(state["noise"]))
+        self._n_fitted = int(state["n_fitted"])
         self._spread = np.array(state["spread"], dtype=np.float64)
         if self._rewards.size:
             self._refresh()

@@ -9,7 +9,6 @@ through the public interface: exact, and independent of how `cmaes` stores itsel
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import cmaes  # type: ignore[import-untyped]  # the package ships no types
 import numpy as np
 from pydantic import Field
 
@@ -32,6 +31,8 @@ class CMALearner(Learner):
     options: CmaOptions
 
     def _setup(self) -> None:
+        import cmaes  # type: ignore[import-untyped]  # no types; loading it takes longer than loading all the rest
+
         bounds = None
         if np.isfinite(self.lo).any() or np.isfinite(self.hi).any():
             bounds = np.stack([self.lo - self.mu0, self.hi - self.mu0], axis=1) / self.sigma0[:, None]
