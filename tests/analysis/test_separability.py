@@ -3,7 +3,7 @@ import pytest
 from sklearn.metrics import roc_auc_score
 
 from ivl.analysis import separability as module
-from ivl.analysis.separability import MODELS, separability
+from ivl.analysis.separability import MODELS, auc_gain, separability
 
 N_CONDITIONS, PER_CONDITION = 120, 5
 CONDITION = np.repeat(np.arange(N_CONDITIONS), PER_CONDITION)
@@ -27,6 +27,20 @@ def test_the_cue_that_matters_is_missed_when_left_out() -> None:
     with_it, without = separability(x, success, CONDITION), separability(x[:, :2], success, CONDITION)
     assert with_it.auc.low > 0.95
     assert without.auc.low < 0.55 < 0.65 > without.auc.value
+
+
+def test_the_gain_of_a_cue_is_known_better_than_the_difference_of_two_intervals() -> None:
+    x = points()
+    success = (x**2).sum(axis=1) < 2
+    both = [separability(cues, success, CONDITION).auc for cues in (x, x[:, :2])]
+    gain = auc_gain(x, x[:, :2], success, CONDITION)
+    assert gain.value == pytest.approx(both[0].value - both[1].value)
+    assert gain.low > 0
+    assert gain.high - gain.low < sum(auc.high - auc.low for auc in both)
+    assert auc_gain(x, x, success, CONDITION).high == 0
+    noise = np.random.default_rng(5).normal(size=(len(x), 1))
+    assert auc_gain(np.column_stack([x, noise]), x, success, CONDITION).value < 0
+    assert np.isnan(auc_gain(x, x, np.ones(len(x), dtype=bool), CONDITION).value)
 
 
 @pytest.mark.parametrize("model", ["svm", "linear"])

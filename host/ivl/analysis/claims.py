@@ -15,7 +15,7 @@ from ivl.analysis.contact import contact_order
 from ivl.analysis.intervals import Estimate, difference
 from ivl.analysis.moment import explained
 from ivl.analysis.rates import RATE, SOLVED_RATE, cell_rates, compare, mean_rate, profile
-from ivl.analysis.separability import separability
+from ivl.analysis.separability import auc_gain, separability
 
 YES, PARTLY, NO, NOT_MEASURED = "yes", "partly", "no", "not measured"
 PAPER_GEAR = "wide_short"
@@ -95,7 +95,9 @@ def _convergence(trials: pd.DataFrame) -> Found:
     own = own[(own["speed_mps"] == 2.5) & (own["angle_deg"] == 90.0)]
     if own.empty:
         return _unmeasured("Wide-Short at 2.5 m/s, 90 degrees")
-    rate = mean_rate(own)
+    cell = cell_rates(own).iloc[0]
+    mean, low, high = (float(cell[f"rate_{end}_norm"]) for end in ("mean", "low", "high"))
+    rate = Estimate(mean, low, high, int(cell["n_trials"]))
     rrev, moment = (float(own[f"recommended_{name}"].median()) for name in ("rrev_c_per_s", "moment_y_Nmm"))
     needed = float(own["rollouts_to_rate"].fillna(np.inf).median()) if "rollouts_to_rate" in own else float("nan")
     near = all(abs(a - b) <= c for a, b, c in zip((rrev, moment), PAPER_POLICY, POLICY_NEAR, strict=True))
@@ -142,25 +144,35 @@ def _one_region(trials: pd.DataFrame) -> Found:
     return verdict, finding, {**numbers, **{f"largest_share_{g}_norm": parts[g].largest_share for g in parts}}
 
 
+def _cues(trials: pd.DataFrame) -> tuple[Estimate, Estimate, Estimate]:
+    """AUC of Wide-Short in flow space, in the augmented space, and the gain of the second over the first."""
+    points = region.trial_points(_gear(trials, PAPER_GEAR))
+    if points.empty:
+        nothing = Estimate(float("nan"), 0.0, 1.0, 0)
+        return nothing, nothing, nothing
+    spaces = [points[list(region.CUE_SETS[space])] for space in ("flow", "augmented")]
+    flow, augmented = (separability(cues, points["success"], points["condition"]).auc for cues in spaces)
+    return flow, augmented, auc_gain(spaces[1], spaces[0], points["success"], points["condition"])
+
+
 def _flow_overlaps(trials: pd.DataFrame) -> Found:
-    """Yes: AUC in flow space below 0.9 (upper end); partly: below that of the augmented space (intervals apart)."""
-    flow, augmented = (_auc(_gear(trials, PAPER_GEAR), space) for space in ("flow", "augmented"))
+    """Yes: AUC in flow space below 0.9 (upper end); partly: below that with d (paired, lower end of the gain > 0)."""
+    flow, augmented, gain = _cues(trials)
     if not np.isfinite(flow.value):
         return _unmeasured("Wide-Short with both solved and unsolved trials")
-    verdict = YES if flow.high < 0.9 else PARTLY if flow.high < augmented.low else NO
-    finding = f"Wide-Short: AUC in (RREV, OF_y) is {show(flow, 3)}; with d it is {show(augmented, 3)}."
-    return verdict, finding, {"auc_flow": flow, "auc_augmented": augmented}
+    verdict = YES if flow.high < 0.9 else PARTLY if gain.low > 0 else NO
+    finding = f"Wide-Short: AUC in (RREV, OF_y) is {show(flow, 3)}; d adds {show(gain, 3)}."
+    return verdict, finding, {"auc_flow": flow, "auc_augmented": augmented, "auc_gain": gain}
 
 
 def _augmented_separates(trials: pd.DataFrame) -> Found:
-    """Yes: AUC in the augmented space of at least 0.95 (lower end) and above flow space; partly: the latter only."""
-    flow, augmented = (_auc(_gear(trials, PAPER_GEAR), space) for space in ("flow", "augmented"))
+    """Yes: AUC with d of at least 0.95 (lower end), and d adds to it (paired, lower end > 0); partly: 0.7 instead."""
+    flow, augmented, gain = _cues(trials)
     if not np.isfinite(augmented.value):
         return _unmeasured("Wide-Short with both solved and unsolved trials")
-    above = augmented.low > flow.high
-    verdict = YES if above and augmented.low >= 0.95 else PARTLY if above else NO
-    finding = f"Wide-Short: AUC in (RREV, OF_y, d) is {show(augmented, 3)}, without d {show(flow, 3)}."
-    return verdict, finding, {"auc_flow": flow, "auc_augmented": augmented}
+    verdict = NO if gain.low <= 0 or augmented.low < 0.7 else YES if augmented.low >= 0.95 else PARTLY
+    finding = f"Wide-Short: AUC in (RREV, OF_y, d) is {show(augmented, 3)}; without d it is less by {show(gain, 3)}."
+    return verdict, finding, {"auc_flow": flow, "auc_augmented": augmented, "auc_gain": gain}
 
 
 def _nonlinear_moment(trials: pd.DataFrame) -> Found:

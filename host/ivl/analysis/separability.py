@@ -13,7 +13,7 @@ Two classifiers of different kinds are offered, because an answer that hangs on 
 `forest`, a random forest (borders along the axes). `linear`, a logistic regression, shows what a plane can do.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,6 +99,40 @@ def separability(
     return Separability(auc, len(y), int(y.sum()), model)
 
 
+def auc_gain(
+    more: npt.ArrayLike, fewer: npt.ArrayLike, success: npt.ArrayLike, condition: npt.ArrayLike, seed: int = 0
+) -> Estimate:
+    """By how much one set of cues separates the same points better than another (`svm`): AUC of `more` - `fewer`.
+
+    Folds and drawn conditions are the same for both, so that what they have in common cancels in the interval.
+
+    Args:
+        more: Cues, shape (n, n_cues).
+        fewer: Other cues of the same points, shape (n, n_other).
+        success: Shape (n,).
+        condition: Shape (n,).
+        seed: Of folds, classifier and bootstrap.
+
+    Returns:
+        The difference; NaN with the interval -1 .. 1 where `separability` gives NaN.
+
+    Raises:
+        ValueError: As `separability`.
+    """
+    rng = np.random.default_rng(seed)
+    x, y, group = _checked(np.column_stack([more, fewer]), success, condition, "svm")
+    x, y, group = _thinned(x, y, group, rng)
+    n_folds = min(FOLDS, *(len(np.unique(group[chosen])) for chosen in (y, ~y)))
+    if n_folds < 2:
+        return Estimate(float("nan"), -1.0, 1.0, len(np.unique(group)))
+    split = np.asarray(more).shape[1]
+    sides = [_fold_wins(part, y, group, n_folds, MODELS["svm"], seed) for part in (x[:, :split], x[:, split:])]
+    weights = [np.ones(len(y)), *_drawn_weights(group, rng)]
+    values = [_auc(sides[0], weight) - _auc(sides[1], weight) for weight in weights]
+    low, high = np.nanquantile(values[1:], (0.025, 0.975))
+    return Estimate(values[0], float(low), float(high), len(np.unique(group)))
+
+
 def _checked(
     cues: npt.ArrayLike, success: npt.ArrayLike, condition: npt.ArrayLike, model: str
 ) -> tuple[FloatArray, BoolArray, npt.NDArray[np.intp]]:
@@ -161,10 +195,14 @@ def _auc(folds: list[_Wins], weight: FloatArray) -> float:
 
 def _bootstrap(folds: list[_Wins], group: npt.NDArray[np.intp], rng: np.random.Generator) -> tuple[float, float]:
     """2.5 and 97.5 % points of the AUC over conditions drawn with replacement."""
-    present = np.unique(group)
-    values = np.empty(BOOTSTRAPS)
-    for k in range(BOOTSTRAPS):
-        drawn = np.bincount(rng.choice(present, len(present)), minlength=int(group.max()) + 1)
-        values[k] = _auc(folds, drawn[group].astype(np.float64))
+    values = [_auc(folds, weight) for weight in _drawn_weights(group, rng)]
     low, high = np.nanquantile(values, (0.025, 0.975))
     return float(low), float(high)
+
+
+def _drawn_weights(group: npt.NDArray[np.intp], rng: np.random.Generator) -> Iterator[FloatArray]:
+    """How often each point is drawn, for each draw of as many conditions as there are, with replacement."""
+    present, n_groups = np.unique(group), int(group.max()) + 1
+    for _ in range(BOOTSTRAPS):
+        drawn = np.bincount(rng.choice(present, len(present)), minlength=n_groups)
+        yield drawn[group].astype(np.float64)
