@@ -235,10 +235,14 @@ class Connection:
             if ping[0] == sent_s:
                 ping[1] = self._heard_s - sent_s
 
-    def quality(self) -> LinkQuality:
-        """How the link has been during the last five seconds."""
+    def forget_pings(self) -> None:
+        """Let `quality` begin anew."""
+        self._pings.clear()
+
+    def quality(self, patience_s: float) -> LinkQuality:
+        """How the last fifty pings went; one without an answer counts once it is older than `patience_s`."""
         now_s = time.monotonic()
-        judged = [ping for ping in list(self._pings) if ping[1] == ping[1] or now_s - ping[0] > self.deadlines.answer_s]
+        judged = [ping for ping in list(self._pings) if ping[1] == ping[1] or now_s - ping[0] > patience_s]
         times = sorted(ping[1] for ping in judged if ping[1] == ping[1])
         p95_s = times[int(0.95 * (len(times) - 1))] if times else float("nan")
         return LinkQuality(len(judged), len(judged) - len(times), p95_s)

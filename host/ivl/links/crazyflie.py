@@ -35,6 +35,10 @@ _AGAIN_S, _IDLE_S = 0.2, 3.0
 JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
 
 
+class VehicleAway(RolloutError):
+    """The vehicle was lost and did not come back in time; the run can be resumed."""
+
+
 class CrazyflieSource:
     """One vehicle, one connection; reconnects by itself when it is lost. A context manager, or call `close`."""
 
@@ -114,15 +118,14 @@ class CrazyflieSource:
             except PolicyRefused as error:
                 self._note(rollout, f"refused: {error}")
                 return Flown(index, _refused(), f"vehicle: {error}")
-            except OperatorStopped:
+            except (OperatorStopped, VehicleAway):
                 raise
             except LinkError as error:
                 self._discard(rollout, attempt, error)
                 self._drop()
             except RolloutError as error:
                 self._discard(rollout, attempt, error)
-                if self._is_sil or attempt > 1:
-                    self._drop()  # a vehicle that has started anew answers, but knows nothing of us
+                self._recover()
         raise RolloutError(
             f"{self.uri}: a rollout was discarded {ATTEMPTS_MAX} times in a row; the last reason is above"
         )
@@ -198,11 +201,20 @@ class CrazyflieSource:
             except LinkError as error:
                 if time.monotonic() >= end_s:
                     away_s = self.options.deadlines.return_s
-                    raise RolloutError(f"the vehicle stayed away for {away_s:g} s: {error}") from error
+                    raise VehicleAway(f"the vehicle stayed away for {away_s:g} s: {error}") from error
                 time.sleep(_AGAIN_S)
             else:
                 self.options.say(f"connected again to {self.uri}")
                 return
+
+    def _recover(self) -> None:
+        """After a flight that went wrong with the link still there: down first; then a new connection, to be sure.
+
+        A vehicle that has started anew answers, but knows nothing of us.
+        """
+        if not self._is_sil and self._vehicle is not None:
+            self.options.say(f"vehicle: {safe_or_why(self._vehicle)}")
+        self._drop()
 
     def _drop(self) -> None:
         """Forget a connection that is no good any more; the vehicle ends its flight by its own rules."""

@@ -19,9 +19,9 @@ from ivl.links.vehicle import Command, Snapshot, Vehicle
 from ivl.world import World
 
 OUTSIDE_RULES = frozenset(
-    ("config", "bypass", "battery_rest", "supervisor", "link", "setpoint", "host", "battery", "uncertain")
+    ("none", "config", "bypass", "battery_rest", "supervisor", "link", "setpoint", "host", "battery", "uncertain")
 )
-"""Safety rules that say something about the flight's surroundings and nothing about its policy."""
+"""Safety rules that say nothing about the policy that was flown; "none": somebody asked for the abort."""
 HEIGHT_M_MIN = 0.3
 _READY_S, _APPROACH_S, _IDLE_S = 5.0, 5.0, 3.0
 _AFTER_READY = (Phase.APPROACH, Phase.FLIP, Phase.COAST, Phase.ATTACHED, Phase.DONE, Phase.ABORTED)
@@ -94,7 +94,7 @@ class Episode:
             LinkError: The same, and the link is gone.
         """
         vehicle = self.vehicle
-        vehicle.abort_reason = ""
+        vehicle.begin_flight()
         start_W_m = field.to_start()
         battery_V = vehicle.battery_V
         policy_seq = vehicle.put_policy(rollout.rrev_c_per_s, rollout.moment_y_Nmm)
@@ -110,14 +110,18 @@ class Episode:
     def _check(self, policy_seq: int, outcome: Outcome) -> None:
         """Refuse to score what was not this policy's landing."""
         vehicle = self.vehicle
-        cause = vehicle.cause
-        if vehicle.abort_reason:
-            raise RolloutError(f"aborted: {vehicle.abort_reason}")
-        if cause in OUTSIDE_RULES:
-            raise RolloutError(f"the vehicle aborted: {cause}")
+        check_abort(vehicle)
         seen = vehicle.watch.values.get("ivl.trg_seq")
         if outcome["triggered"][0] and seen is not None and int(seen) != policy_seq:
             raise RolloutError(f"the trigger fired for policy {int(seen)}, not {policy_seq}")
+
+
+def check_abort(vehicle: Vehicle) -> None:
+    """Raise RolloutError if this flight was aborted for a reason that says nothing about its policy."""
+    if vehicle.aborted_by and vehicle.abort_reason:
+        raise RolloutError(f"aborted: {vehicle.abort_reason}")
+    if vehicle.aborted_by in OUTSIDE_RULES:
+        raise RolloutError(f"the vehicle aborted: {vehicle.aborted_by}")
 
 
 def start_point(world: World, experiment: Experiment) -> Point:
@@ -165,6 +169,7 @@ def make_safe(vehicle: Vehicle) -> str:
             vehicle.land(0.0, 4.0)
             vehicle.wait(lambda: not vehicle.is_flying(), 20.0, "landing", 0.5)
             done.append("landed")
+        vehicle.stop_planner()
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
     finally:
         if not vehicle.session.cf.lost:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ivl.errors import RolloutError
 from ivl.experiment import Experiment
 from ivl.links import operators, sil
-from ivl.links.episode import Outcome, Point, Rollout
+from ivl.links.episode import Outcome, Point, Rollout, check_abort
 from ivl.links.operators import Operator
 from ivl.links.packets import Phase, Recording, Request
 from ivl.links.tracking import Tracking
@@ -157,9 +157,8 @@ class Room:
         vehicle.pause(_SETTLE_S)
         self._restore_tumble_check()
         aborted = vehicle.phase == Phase.ABORTED
-        why = vehicle.cause
-        if vehicle.abort_reason and aborted:
-            raise RolloutError(f"aborted: {vehicle.abort_reason}")
+        why = vehicle.aborted_by
+        check_abort(vehicle)
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         recording = vehicle.recording(policy_seq)
         seen_at = self._tracking.resting() if self._tracking is not None else None

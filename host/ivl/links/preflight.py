@@ -14,10 +14,10 @@ from ivl.experiment import Experiment
 from ivl.links.packets import Phase
 from ivl.links.vehicle import Supervisor, Vehicle
 
-PINGS_MIN, LOST_MAX, P95_S_MAX = 10, 0.1, 0.1
+PINGS_MIN, LOST_MAX, P95_S_MAX = 20, 0.15, 0.1
 BATTERY_V_MIN, BATTERY_S = 3.7, 2.0
 SIGMA_M_MAX, SIGMA_S = 0.1, 10.0
-_LINK_S, _PING_S = 3.0, 0.02
+_LINK_S, _PING_S, _PONG_S = 3.0, 0.02, 0.5
 _TYPES = {"f4": "<f", "u1": "<B", "u2": "<H", "u4": "<L"}
 _CONTROLLER_APP = 6
 
@@ -79,12 +79,14 @@ def tables(vehicle: Vehicle) -> Check:
 
 
 def link(vehicle: Vehicle) -> Check:
-    """Pings of the last seconds."""
+    """A burst of pings, and half a second for the answers."""
     session = vehicle.session
+    session.forget_pings()
     usual_s, session.ping_s = session.ping_s, _PING_S
-    vehicle.wait_in_wall_time(lambda: session.quality().sent >= PINGS_MIN, _LINK_S)
+    vehicle.wait_in_wall_time(lambda: session.quality(0.0).sent >= PINGS_MIN, _LINK_S)
     session.ping_s = usual_s
-    quality = session.quality()
+    vehicle.wait_in_wall_time(lambda: session.quality(0.0).lost == 0, _PONG_S)
+    quality = session.quality(0.0)
     lost = quality.lost / quality.sent if quality.sent else 1.0
     ok = quality.sent >= PINGS_MIN and lost <= LOST_MAX and quality.p95_s <= P95_S_MAX
     return Check(

@@ -34,9 +34,8 @@ _SOURCE_CHANNEL = 1
 
 @cache
 def init_drivers() -> None:
-    """Make every kind of link known to cflib, once in a process, and keep its log off the terminal."""
-    logging.getLogger("cflib").addHandler(logging.NullHandler())
-    logging.getLogger("cflib").propagate = False
+    """Make every kind of link known to cflib, once in a process, and silence its log of each packet that is ours."""
+    logging.getLogger("cflib").setLevel(logging.CRITICAL + 1)
     cflib.crtp.init_drivers(enable_serial_driver=True)
 
 

@@ -68,8 +68,10 @@ def outcome_of_flight(
         outcome["d_trigger_m"], outcome["rrev_trigger"] = snapshot.d_ceil_m, snapshot.rrev_per_s
         outcome["of_y_trigger"] = snapshot.of_y_radps
     if impact is not None:
-        _fill(outcome, rows, impact, "impact")
-        outcome["theta_impact_deg"] = pitch_deg(rows["q_WB"])[impact]
+        # the row in which a contact is felt is after it: how the vehicle came is in the row before
+        _fill(outcome, rows, impact - 1, "impact")
+        outcome["t_impact_s"] = rows["t_s"][impact]
+        outcome["theta_impact_deg"] = pitch_deg(rows["q_WB"])[impact - 1]
     return outcome
 
 

@@ -100,7 +100,9 @@ class Vehicle:
         self.session, self.clock = session, clock or WallClock()
         self.command = Command(Request.IDLE)
         self.abort_reason = ""
-        """Why `abort` was called last; cleared by who flies."""
+        """Why `abort` was called; empty if it was not."""
+        self.aborted_by = ""
+        """Safety rule by which the vehicle aborted ("none": it was asked to); empty if it has not."""
         self._seq = secrets.randbits(16)
         self._policy_seq = secrets.randbits(31)
         self._echo: dict[PacketType, Packet] = {}
@@ -126,6 +128,8 @@ class Vehicle:
         if packet is None or (packet.type == PacketType.COMMAND_ECHO and self._is_late(packet)):
             return
         self._echo[packet.type] = packet
+        if packet.type == PacketType.COMMAND_ECHO and packet["phase"] == Phase.ABORTED and not self.aborted_by:
+            self.aborted_by = native.library().rule_name(int(packet["cause"]))
 
     def _is_late(self, packet: Packet) -> bool:
         """Whether a later command has been answered before."""
@@ -178,6 +182,10 @@ class Vehicle:
         )  # fmt: skip
         self.session.send(_PORT_PLATFORM, _APP, data)
         return self._seq
+
+    def begin_flight(self) -> None:
+        """Forget how the last flight was aborted."""
+        self.abort_reason = self.aborted_by = ""
 
     def abort(self, reason: str) -> None:
         """Ask for an abort, once; before the trigger it is obeyed, later it changes nothing. From any thread."""
@@ -334,6 +342,10 @@ class Vehicle:
     def land(self, height_m: float, duration_s: float) -> None:
         """Descend, by the high-level commander."""
         self._high_level(struct.pack("<BBff?f", 8, 0, height_m, 0.0, True, duration_s), "landing")
+
+    def stop_planner(self) -> None:
+        """Let the high-level commander ask for nothing any more: on the ground, or it takes off again."""
+        self._high_level(struct.pack("<BB", 3, 0), "stop of the high-level commander")
 
     def _high_level(self, data: bytes, what: str) -> None:
         answer = self.session.ask(_PORT_HL, 0, data, data[:1], what)

@@ -1,0 +1,5 @@
+"""`python -m ivl` is `ivl`."""
+
+from ivl.cli import main
+
+main()

@@ -1,0 +1,287 @@
+"""Rollouts over a link against rollouts in this process: the same bits, whatever happens to the link."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ivl import campaign, experiment
+from ivl.errors import ConfigError, LinkError, RolloutError
+from ivl.experiment import Experiment
+from ivl.links import crazyflie, open_source
+from ivl.links import vehicle as vehicles
+from ivl.links.crazyflie import CrazyflieSource
+from ivl.links.deadlines import Deadlines
+from ivl.links.options import Options
+from ivl.links.packets import Packet, PacketType
+from ivl.silproc import SilProcess
+from ivl.source import Plan, WorldSource
+
+
+def fly_both(server: SilProcess, chosen: Experiment, plan: Plan, options: Options | None = None) -> CrazyflieSource:
+    """Fly a plan over the link and in this process, and compare every outcome bit for bit."""
+    with CrazyflieSource(server.uri, chosen, options) as source:
+        flown = list(source.fly(plan))
+    (wanted,) = WorldSource(chosen.make_world(), chosen).fly(plan)
+    assert [int(part.index[0]) for part in flown] == list(range(len(plan.theta)))
+    assert all(part.discarded == "" for part in flown)
+    assert b"".join(part.outcomes.tobytes() for part in flown) == wanted.outcomes.tobytes()
+    return source
+
+
+def first(plan: Plan, n: int) -> Plan:
+    return Plan(plan.theta[:n], plan.seed[:n], plan.stream[:n])
+
+
+def rows_of(folder: Path) -> list[list[tuple[object, ...]]]:
+    """Everything that a run has stored about rollouts, episodes and learners."""
+    with sqlite3.connect(folder / "run.sqlite") as db:
+        tables = ("rollout ORDER BY trial, episode, idx", "episode", "learner")
+        return [db.execute(f"SELECT * FROM {table}").fetchall() for table in tables]
+
+
+# ---- the same bits
+
+
+def test_outcomes_have_the_same_bits_as_in_process(server: SilProcess, vertical: Experiment, plan: Plan) -> None:
+    assert fly_both(server, vertical, plan).n_discarded == 0
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ["speed_mps=2.2", "angle_deg=60.3", "start=flown"],
+        ["gear=narrow_long", "speed_mps=3.3", "sense.latency=0.02", "sense.position_noise=0.003"],
+    ],
+)
+def test_outcomes_have_the_same_bits_when_numbers_are_not_of_single_precision(
+    plan: Plan, vertical: Experiment, settings: list[str]
+) -> None:
+    data = vertical.to_yaml()
+    path = Path(os.environ["XDG_CACHE_HOME"]).parent / "other.yaml"
+    path.write_text(data)
+    chosen = experiment.load(str(path), settings)
+    with SilProcess(chosen.make_world()) as server:
+        fly_both(server, chosen, first(plan, 4))
+
+
+def test_learning_stores_the_same_bits_as_in_process(server: SilProcess, vertical: Experiment, tmp_path: Path) -> None:
+    campaign.run(vertical, tmp_path / "link", uri=server.uri)
+    campaign.run(vertical, tmp_path / "here")
+    assert rows_of(tmp_path / "link") == rows_of(tmp_path / "here")
+    journal = (tmp_path / "link" / "flights.jsonl").read_text().splitlines()
+    assert len(journal) == vertical.budget
+
+
+def test_software_vehicle_gets_its_time_back(server: SilProcess, vertical: Experiment, plan: Plan) -> None:
+    fly_both(server, vertical, first(plan, 1))
+    assert server.get("sil.lockstep") == 0
+    assert server.get("sil.start") == 255
+    began_ms = server.get("sil.time_ms")
+    time.sleep(0.1)
+    assert server.get("sil.time_ms") > began_ms
+
+
+# ---- faults: nothing scored wrongly, nothing lost
+
+
+@pytest.mark.parametrize(
+    ("faults", "n"),
+    [
+        ({"loss": 0.05}, 6),
+        ({"loss": 0.2}, 3),
+        ({"jitter_ms": 50}, 1),
+        ({"duplicate": 0.3, "reorder": 0.3}, 4),
+    ],
+    ids=lambda value: "+".join(value) if isinstance(value, dict) else "",
+)
+def test_outcomes_are_right_on_a_bad_link(
+    server: SilProcess, vertical: Experiment, plan: Plan, faults: dict[str, float], n: int
+) -> None:
+    with CrazyflieSource(server.uri, vertical) as source:
+        for name, value in faults.items():
+            server.set(f"fault.{name}", value)
+        flown = list(source.fly(first(plan, n)))
+        for name in faults:
+            server.set(f"fault.{name}", 0)
+    (wanted,) = WorldSource(vertical.make_world(), vertical).fly(first(plan, n))
+    assert b"".join(part.outcomes.tobytes() for part in flown) == wanted.outcomes.tobytes()
+    assert server.get("fault.n_lost") + server.get("fault.n_duplicated") > 0 or "jitter_ms" in faults
+
+
+def freeze(server: SilProcess) -> None:
+    server.set("fault.freeze_ms", 3000)
+
+
+def cut(server: SilProcess) -> None:
+    server.set("fault.cut_ms", 3000)
+
+
+def restart(server: SilProcess) -> None:
+    server.kill()
+    time.sleep(0.4)
+    server.start()
+
+
+def restart_at_once(server: SilProcess) -> None:
+    server.kill()
+    server.start()
+
+
+@pytest.mark.parametrize("fault", [freeze, cut, restart, restart_at_once], ids=lambda fault: fault.__name__)
+def test_flight_is_discarded_and_flown_again_when_the_vehicle_goes_away_in_it(
+    server: SilProcess, vertical: Experiment, plan: Plan, fault: Callable[[SilProcess], None]
+) -> None:
+    said: list[str] = []
+    failed: list[LinkError] = []
+
+    def strike() -> None:
+        try:
+            fault(server)
+        except LinkError as error:
+            failed.append(error)
+
+    striker = threading.Thread(target=strike)
+    flown = []
+    with CrazyflieSource(server.uri, vertical, Options(say=said.append)) as source:
+        strike_in_flight(source, striker)
+        for part in source.fly(first(plan, 4)):
+            flown.append(part)
+        striker.join()
+        flown += list(source.fly(first(plan, 1)))
+    (wanted,) = WorldSource(vertical.make_world(), vertical).fly(first(plan, 4))
+    got = b"".join(part.outcomes.tobytes() for part in flown)
+    assert not failed
+    assert got == wanted.outcomes.tobytes() + wanted.outcomes[:1].tobytes()
+    assert source.n_discarded >= 1, said
+    assert any(line.startswith("flight discarded, flown again") for line in said)
+    assert any(line.startswith("connected again") for line in said)
+
+
+def strike_in_flight(source: CrazyflieSource, striker: threading.Thread) -> None:
+    """Let the fault strike in the second landing, after its approach has begun."""
+    assert source._field is not None
+    original, n_calls = source._field.outcome, 0
+
+    def outcome(policy_seq: int) -> object:
+        nonlocal n_calls
+        n_calls += 1
+        if n_calls == 2:
+            striker.start()
+            time.sleep(0.1)
+        return original(policy_seq)
+
+    source._field.outcome = outcome  # type: ignore[method-assign, assignment]
+
+
+def test_run_ends_and_can_be_resumed_when_the_vehicle_stays_away(
+    server: SilProcess, vertical: Experiment, plan: Plan
+) -> None:
+    options = Options(deadlines=replace(Deadlines(), return_s=0.5))
+    with CrazyflieSource(server.uri, vertical, options) as source:
+        flight = source.fly(first(plan, 2))
+        next(flight)
+        server.kill()
+        with pytest.raises(RolloutError, match=r"the vehicle stayed away for 0\.5 s: .* nobody listens there"):
+            next(flight)
+
+
+# ---- what is never scored
+
+
+@pytest.mark.parametrize("member", ["seq_in_force", "rrev_c_per_s", "moment_y_Nm"])
+def test_policy_is_not_flown_when_the_vehicle_echoes_another(
+    server: SilProcess, vertical: Experiment, plan: Plan, monkeypatch: pytest.MonkeyPatch, member: str
+) -> None:
+    decode = vehicles.decode
+
+    def other(data: bytes) -> Packet | None:
+        packet = decode(data)
+        if packet is not None and packet.type == PacketType.POLICY_ECHO:
+            return Packet(packet.type, {**packet.values, member: packet[member] + 1})
+        return packet
+
+    monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 2)
+    said: list[str] = []
+    with CrazyflieSource(server.uri, vertical, Options(say=said.append)) as source:
+        monkeypatch.setattr(vehicles, "decode", other)
+        with pytest.raises(RolloutError, match="discarded 2 times in a row"):
+            next(source.fly(first(plan, 1)))
+        assert source.n_discarded == 2
+        assert server.get("sil.episode") == 0, "no landing was begun"
+    assert any("not in force" in line for line in said)
+
+
+def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess, vertical: Experiment) -> None:
+    theta = np.array([[25.0, 8.0], [4.8, 8.0]])
+    plan = Plan(theta, np.zeros(2, dtype=np.uint64), np.arange(2, dtype=np.uint64))
+    with CrazyflieSource(server.uri, vertical) as source:
+        refused, flown = source.fly(plan)
+    assert refused.discarded.startswith("vehicle: policy RREV_c 25")
+    assert np.isnan(refused.outcomes["t_impact_s"][0])
+    assert flown.discarded == ""
+    assert flown.outcomes["triggered"][0] == 1
+
+
+def test_outcome_of_another_policy_is_not_scored(
+    server: SilProcess, vertical: Experiment, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 1)
+    with CrazyflieSource(server.uri, vertical) as source:
+        put = vehicles.Vehicle.put_policy
+        monkeypatch.setattr(vehicles.Vehicle, "put_policy", lambda *args: put(*args) + 1)
+        with pytest.raises(RolloutError, match="discarded 1 times"):
+            next(source.fly(first(plan, 1)))
+
+
+def test_bounds_beyond_the_vehicle_are_refused_before_the_first_flight(server: SilProcess) -> None:
+    chosen = experiment.load("experiments/paper_vertical.yaml", ["policy.rrev_c_per_s.bounds=[0.0, 30.0]"])
+    with pytest.raises(RolloutError, match=r"policy bounds: RREV_c 0 \.\. 30"):
+        CrazyflieSource(server.uri, chosen)
+
+
+# ---- the run around it
+
+
+def test_ctrl_c_stops_cleanly_and_the_resumed_run_has_the_same_bits(
+    server: SilProcess, vertical: Experiment, tmp_path: Path
+) -> None:
+    longer = vertical.model_copy(update={"budget": 80})
+    path = tmp_path / "vertical.yaml"
+    path.write_text(longer.to_yaml())
+    command = [sys.executable, "-m", "ivl", "learn", str(path), "--uri", server.uri, "--out", str(tmp_path / "link")]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        lines = [process.stderr.readline() for _ in range(2)]
+        process.send_signal(signal.SIGINT)
+        lines += process.stderr.read().splitlines(keepends=True)
+        assert process.wait(30) == 130, lines
+    assert any("--resume" in line for line in lines)
+    assert "Traceback" not in "".join(lines)
+    assert server.get("sil.lockstep") == 0
+    assert server.get("ivl.phase") == 0
+    n_flown = len((tmp_path / "link" / "flights.jsonl").read_text().splitlines())
+    assert 4 <= n_flown < longer.budget
+    campaign.run(longer, tmp_path / "link", resume=True, uri=server.uri)
+    campaign.run(longer, tmp_path / "here")
+    assert rows_of(tmp_path / "link") == rows_of(tmp_path / "here")
+
+
+def test_nothing_is_created_when_the_vehicle_cannot_be_reached(vertical: Experiment, tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match="no Crazyradio is plugged in"):
+        campaign.run(vertical, tmp_path / "run", uri="radio://0/80/2M/E7E7E7E7E7")
+    assert not (tmp_path / "run").exists()
+
+
+def test_unknown_scheme_is_refused(vertical: Experiment) -> None:
+    with pytest.raises(ConfigError, match=r"allowed pil://, udp://, radio://"):
+        open_source("ftp://x", vertical)

@@ -1,0 +1,144 @@
+"""The outcome of a landing as a person and a recorder see it, and the questions in the terminal."""
+
+import io
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from ivl import World
+from ivl.links import packets, truth
+from ivl.links.operators import ConsoleOperator, OperatorStopped, Seen
+from ivl.links.packets import Phase, Recording
+from ivl.links.truth import Resting
+from ivl.links.vehicle import Snapshot
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return World("habas2021", "wide_short", "as_simulated")
+
+
+def test_pitch_is_nose_up_and_goes_on_beyond_half_a_turn() -> None:
+    angles = np.radians(np.arange(0.0, 271.0, 10.0))
+    q_WB = np.column_stack((0 * angles, -np.sin(angles / 2), 0 * angles, np.cos(angles / 2)))
+    assert truth.pitch_deg(q_WB) == pytest.approx(np.degrees(angles))
+
+
+def test_pitch_agrees_with_the_simulator_through_a_landing(world: World) -> None:
+    rows = world.trace(2.5, 90.0, 4.8, 8.0).rows
+    assert truth.pitch_deg(rows.q_WB) == pytest.approx(rows.pitch_deg, abs=1e-6)
+
+
+def test_legs_are_suggested_from_height_and_tilt(world: World) -> None:
+    ceiling_m = world.params.values["world.ceiling_height"]
+    gap_m = truth.hanging_gap_m(world)
+    level = Resting(ceiling_m - gap_m, -1.0)
+    assert truth.suggest_legs(level, world) == 4
+    assert truth.suggest_legs(replace(level, up_z=-math.cos(math.radians(40))), world) == 2
+    assert truth.suggest_legs(replace(level, up_z=0.3), world) == 2
+    assert truth.suggest_legs(Resting(0.03, 1.0), world) == 0
+
+
+def test_hanging_height_is_where_the_simulated_vehicle_comes_to_rest(world: World) -> None:
+    rows = world.trace(2.5, 90.0, 4.8, 8.0).rows
+    assert rows.d_ceil_m[-1] == pytest.approx(truth.hanging_gap_m(world), abs=0.02)
+
+
+def recording_of(world: World, rrev_c_per_s: float, moment_y_Nmm: float) -> Recording:
+    """What an ideal recorder would hold of a simulated landing, without forces."""
+    flight = world.trace(2.5, 90.0, rrev_c_per_s, moment_y_Nmm, period_s=0.002).rows
+    names = [("t_s", "f8", ()), ("p_W_m", "f8", (3,)), ("v_W_mps", "f8", (3,)), ("q_WB", "f8", (4,))]
+    names += [("w_B_radps", "f8", (3,)), ("f_B_mps2", "f8", (3,)), ("phase", "u1", ())]
+    rows = np.zeros(len(flight), dtype=names)
+    for name, source in (("t_s", "t_s"), ("p_W_m", "p_WB_m"), ("v_W_mps", "v_WB_mps"), ("q_WB", "q_WB")):
+        rows[name] = flight[source]
+    rows["w_B_radps"], rows["phase"] = flight.w_B_radps, flight.phase
+    flips = np.flatnonzero(rows["phase"] == Phase.FLIP)
+    return Recording(1, 1, int(flips[0]) if len(flips) else None, 500.0, rows)
+
+
+def test_outcome_of_a_recording_agrees_with_the_simulator(world: World) -> None:
+    known = world.trace(2.5, 90.0, 4.8, 8.0).outcome
+    recording = recording_of(world, 4.8, 8.0)
+    touch = int(np.argmax(recording.rows["t_s"] >= known.t_impact_s))
+    recording.rows["f_B_mps2"][touch] = (0.0, 0.0, -60.0)
+    snapshot = Snapshot(1, 0.5, 4.9, 0.0, 0.0, 2.5)
+    rest = recording.rows["p_W_m"][-1, 2]
+    outcome = truth.outcome_of_flight(recording, snapshot, 4, False, Resting(rest, -1.0), world)[0]
+    assert outcome["t_trigger_s"] == pytest.approx(known.t_trigger_s, abs=0.003)
+    assert outcome["t_impact_s"] == pytest.approx(known.t_impact_s, abs=0.003)
+    assert outcome["theta_impact_deg"] == pytest.approx(known.theta_impact_deg, abs=5.0)
+    assert outcome["vz_impact_mps"] == pytest.approx(known.vz_impact_mps, abs=0.1)
+    assert outcome["rate_impact_radps"] == pytest.approx(known.rate_impact_radps, abs=3.0)
+    assert outcome["d_min_m"] == pytest.approx(known.d_min_m, abs=0.003)
+    assert world.end_reason(outcome["end_reason"]) == "contact_time"
+    assert (outcome["n_legs"], outcome["d_trigger_m"], outcome["rrev_trigger"]) == (4, 0.5, 4.9)
+
+
+def test_outcome_without_a_trigger_says_nothing_about_one(world: World) -> None:
+    recording = replace(recording_of(world, 4.8, 8.0), trigger_row=None)
+    snapshot = Snapshot(9, 0.5, 4.9, 0.0, 0.0, 2.5)
+    outcome = truth.outcome_of_flight(recording, snapshot, 0, False, Resting(0.0, 1.0), world)[0]
+    assert outcome["triggered"] == 0
+    assert np.isnan([outcome["t_trigger_s"], outcome["d_trigger_m"], outcome["t_impact_s"]]).all()
+
+
+# ---- the terminal
+
+
+class Terminal(Console):
+    """A console with a person at it who types these lines."""
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__(file=io.StringIO(), width=100)
+        self._lines = list(lines)
+
+    def input(self, *args: object, **kwargs: object) -> str:
+        del args, kwargs
+        if not self._lines:
+            raise EOFError
+        return self._lines.pop(0)
+
+    @property
+    def text(self) -> str:
+        assert isinstance(self.file, io.StringIO)
+        return self.file.getvalue()
+
+
+RESTING = Resting(2.96, -1.0)
+
+
+@pytest.mark.parametrize(
+    ("lines", "wanted"),
+    [
+        (("", ""), Seen(4, False)),
+        (("3", "y"), Seen(3, True)),
+        (("7", "2", "n"), Seen(2, False)),
+        (("d",), Seen(0, False, discard=True)),
+    ],
+)
+def test_outcome_is_confirmed_or_corrected_by_single_keys(lines: tuple[str, ...], wanted: Seen) -> None:
+    assert ConsoleOperator(Terminal(*lines)).confirm(Seen(4, False), RESTING, "") == wanted
+
+
+@pytest.mark.parametrize("lines", [("q",), ("4", "q"), ()])
+def test_operator_can_stop_at_any_question(lines: tuple[str, ...]) -> None:
+    with pytest.raises(OperatorStopped, match="can be resumed"):
+        ConsoleOperator(Terminal(*lines)).confirm(Seen(4, False), RESTING, "")
+
+
+def test_take_off_is_counted_down_and_the_battery_is_named() -> None:
+    terminal = Terminal("y", "y")
+    operator = ConsoleOperator(terminal, countdown_s=1)
+    operator.place((0.0, 0.0, 1.34))
+    operator.change_battery(3.42, 3.7)
+    assert "hover at 1.34 m" in terminal.text
+    assert "take-off in 1" in terminal.text
+    assert "BATTERY 3.42 V, needed 3.70 V" in terminal.text
+
+
+def test_recorder_constants_are_those_of_the_firmware() -> None:
+    assert int.from_bytes(b"IVLR", "little") == packets.RECORD_MAGIC

@@ -1,0 +1,233 @@
+"""The drone's way to fly, rehearsed with a software vehicle: floor, operator, recorder, and the simulator's truth."""
+
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ivl import native
+from ivl.errors import ConfigError, RolloutError
+from ivl.experiment import Experiment
+from ivl.links import crazyflie
+from ivl.links.crazyflie import CrazyflieSource
+from ivl.links.episode import Rollout, make_safe, start_point
+from ivl.links.operators import OperatorStopped, Seen
+from ivl.links.options import Options
+from ivl.links.packets import Phase, Request
+from ivl.links.truth import Resting
+from ivl.links.vehicle import Command, Supervisor, Vehicle
+from ivl.mocap import config as mocap_config
+from ivl.silproc import SilProcess
+from ivl.source import Plan
+
+GOOD = Rollout(4.8, 8.0)
+
+
+class Script:
+    """An operator who answers as told; what was asked is in `asked`."""
+
+    def __init__(self, answers: list[Callable[[Seen], Seen]] | None = None, n_flights: int = 10) -> None:
+        self.answers = answers or []
+        self.n_flights = n_flights
+        self.asked: list[str] = []
+        self.resting: list[Resting] = []
+        self.on_battery: Callable[[], object] = lambda: None
+
+    def place(self, start_W_m: tuple[float, float, float]) -> None:
+        assert start_W_m[2] > 0.3
+        if self.n_flights == 0:
+            raise OperatorStopped("enough")
+        self.n_flights -= 1
+        self.asked.append("place")
+
+    def change_battery(self, battery_V: float, needed_V: float) -> None:
+        assert battery_V < needed_V
+        self.asked.append(f"battery {battery_V:.1f}")
+        self.on_battery()
+
+    def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
+        self.asked.append(f"confirm {suggested.n_legs} {note}".strip())
+        self.resting.append(resting)
+        return self.answers.pop(0)(suggested) if self.answers else suggested
+
+
+@pytest.fixture
+def script() -> Script:
+    return Script()
+
+
+@pytest.fixture
+def source(server: SilProcess, vertical: Experiment, script: Script, tmp_path: Path) -> Iterator[CrazyflieSource]:
+    with CrazyflieSource(server.uri, vertical, Options(tmp_path, script, rehearse=True)) as opened:
+        yield opened
+
+
+def plan_of(*rollouts: Rollout) -> Plan:
+    theta = np.array([(r.rrev_c_per_s, r.moment_y_Nmm) for r in rollouts])
+    return Plan(theta, np.zeros(len(theta), dtype=np.uint64), np.arange(len(theta), dtype=np.uint64))
+
+
+def truth(vehicle: Vehicle) -> np.ndarray:
+    """The simulator's outcome of the landing that was just flown."""
+    number = vehicle.session.memory(0x1E)
+    assert number is not None
+    dtype = native.library().outcome_dtype
+    data = vehicle.session.read_memory(number, 0, 16 + dtype.itemsize, "outcome")
+    assert struct.unpack("<4L", data[:16])[2] == dtype.itemsize
+    return np.frombuffer(data[16:], dtype=dtype)
+
+
+def vehicle_of(source: CrazyflieSource) -> Vehicle:
+    assert source._vehicle is not None
+    return source._vehicle
+
+
+def test_landing_is_flown_from_the_floor_and_judged_as_the_simulator_does(
+    source: CrazyflieSource, script: Script, tmp_path: Path
+) -> None:
+    landing = source.fly_one(GOOD)
+    known = truth(vehicle_of(source))
+    outcome = landing.outcome
+    assert script.asked == ["place", "confirm 4"]
+    assert outcome["n_legs"][0] == known["n_legs"][0] == 4
+    assert outcome["triggered"][0] == known["triggered"][0] == 1
+    assert outcome["d_trigger_m"][0] == known["d_trigger_m"][0]
+    assert outcome["rrev_trigger"][0] == known["rrev_trigger"][0]
+    flight_s = known["t_impact_s"][0] - known["t_trigger_s"][0]
+    # the recorder has a row each 2 ms, and the accelerometer's first row after a contact is one more
+    assert outcome["t_impact_s"][0] - outcome["t_trigger_s"][0] == pytest.approx(flight_s, abs=0.03)
+    assert outcome["theta_impact_deg"][0] == pytest.approx(known["theta_impact_deg"][0], abs=30.0)
+    assert outcome["vz_trigger_mps"][0] == pytest.approx(known["vz_trigger_mps"][0], abs=0.05)
+    assert outcome["d_min_m"][0] == pytest.approx(known["d_min_m"][0], abs=0.02)
+    assert landing.snapshot.policy_seq == landing.policy_seq == landing.recording.policy_seq
+    (saved,) = (tmp_path / "recordings").iterdir()
+    assert len(saved.read_text().splitlines()) == 1 + len(landing.recording.rows)
+    assert vehicle_of(source).session.read(["supervisor.tmblChckEn"])["supervisor.tmblChckEn"] == 1
+
+
+def test_fall_is_seen_as_no_landing(source: CrazyflieSource) -> None:
+    outcome = source.fly_one(Rollout(2.0, 6.0)).outcome
+    known = truth(vehicle_of(source))
+    assert outcome["n_legs"][0] == known["n_legs"][0] == 0
+    # the simulator ends a landing as soon as it can only be missed, the recorder sees the vehicle's whole rise
+    assert known["d_min_m"][0] - 0.2 < outcome["d_min_m"][0] <= known["d_min_m"][0]
+    assert source.world.end_reason(int(outcome["end_reason"][0])) == "missed"
+
+
+def test_operator_corrects_the_outcome(source: CrazyflieSource, script: Script) -> None:
+    script.answers = [lambda _: Seen(3, body_contact=True)]
+    outcome = source.fly_one(GOOD).outcome
+    assert (outcome["n_legs"][0], outcome["body_contact"][0]) == (3, 1)
+
+
+def test_discarded_flight_is_flown_again_with_the_same_policy(source: CrazyflieSource, script: Script) -> None:
+    script.answers = [lambda seen: Seen(seen.n_legs, False, discard=True)]
+    (flown,) = source.fly(plan_of(GOOD))
+    assert script.asked == ["place", "confirm 4", "place", "confirm 4"]
+    assert source.n_discarded == 1
+    assert flown.outcomes["n_legs"][0] == 4
+
+
+def test_run_stops_and_keeps_what_was_flown_when_the_operator_stops(source: CrazyflieSource, script: Script) -> None:
+    script.n_flights = 1
+    flight = source.fly(plan_of(GOOD, GOOD))
+    assert next(flight).outcomes["n_legs"][0] == 4
+    with pytest.raises(OperatorStopped):
+        next(flight)
+
+
+def test_operator_is_asked_for_a_battery_until_it_is_good(
+    source: CrazyflieSource, script: Script, server: SilProcess
+) -> None:
+    server.set("sil.vbat", 3.6)
+    script.on_battery = lambda: server.set("sil.vbat", 3.5 if len(script.asked) < 3 else 4.0)
+    source.fly_one(GOOD)
+    assert script.asked[0] == "place"
+    assert [line.split()[0] for line in script.asked] == ["place", "battery", "battery", "confirm"]
+
+
+def test_vehicle_that_aborts_for_its_surroundings_is_not_scored(
+    source: CrazyflieSource, server: SilProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 1)
+    field = source._field
+    assert field is not None
+    monkeypatch.setattr(field, "before_approach", lambda _: server.set("sil.vbat", 2.9))
+    with pytest.raises(RolloutError, match="discarded 1 times"):
+        next(source.fly(plan_of(GOOD)))
+    assert source.n_discarded == 1
+
+
+def test_locked_vehicle_is_refused_with_what_to_do(source: CrazyflieSource) -> None:
+    vehicle = vehicle_of(source)
+    vehicle.session.send(9, 1, b"\x03")
+    vehicle.pause(5.0)  # it has just landed, and looks for an emergency stop once it is ready again
+    assert Supervisor.LOCKED in vehicle.supervisor()
+    with pytest.raises(RolloutError, match="locked: switch it off and on again"):
+        source._field._make_fit()  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("phase", [Phase.READY, Phase.APPROACH, Phase.FLIP])
+def test_vehicle_is_brought_down_and_disarmed_from_any_phase(source: CrazyflieSource, phase: Phase) -> None:
+    vehicle, field = vehicle_of(source), source._field
+    assert field is not None
+    start_W_m = field.to_start()
+    vehicle.put_policy(4.8, 8.0)
+    vehicle.ask_for(Command(Request.HOVER, start_W_m), (Phase.READY,), 5.0)
+    if phase != Phase.READY:
+        vehicle.ask_for(Command(Request.APPROACH, start_W_m, 2.5, 1.57), (phase,), 5.0)
+    done = make_safe(vehicle)
+    assert done == ("flip completed, disarmed" if phase == Phase.FLIP else "landed, disarmed")
+    assert vehicle.phase == Phase.IDLE
+    vehicle.pause(4.0)
+    assert not vehicle.is_flying()
+    if phase != Phase.FLIP:
+        assert vehicle.position_W_m[2] < 0.1
+
+
+def test_hovering_vehicle_is_landed(source: CrazyflieSource) -> None:
+    vehicle, field = vehicle_of(source), source._field
+    assert field is not None
+    field.to_start()
+    assert make_safe(vehicle) == "landed, disarmed"
+    assert vehicle.position_W_m[2] < 0.1
+
+
+def test_lost_camera_before_the_trigger_aborts_and_is_not_scored(
+    server: SilProcess, vertical: Experiment, script: Script
+) -> None:
+    """In real time: cameras have a clock of their own."""
+    options = Options(operator=script, rehearse=True, mocap=mocap_config.load("simulator"))
+    with CrazyflieSource(server.uri, vertical, options) as source:
+        tracking, vehicle = source._tracking, vehicle_of(source)
+        assert tracking is not None
+        assert tracking.room is not None
+        room = tracking.room
+
+        def occlude() -> None:
+            while vehicle.phase != Phase.READY:
+                time.sleep(0.01)
+            room.occluded = True
+
+        thread = threading.Thread(target=occlude)
+        thread.start()
+        with pytest.raises(RolloutError, match=r"aborted: motion capture: cf21 is not seen"):
+            source.fly_one(GOOD)
+        thread.join()
+        assert vehicle.phase == Phase.ABORTED
+        server.kill()
+
+
+def test_start_point_leaves_room_for_speed_and_hold(vertical: Experiment) -> None:
+    world = vertical.make_world()
+    x, y, z = start_point(world, vertical)
+    accel, hold_s = world.params.values["firmware.approach_accel"], world.params.values["start.hold_time"]
+    plane = world.params.values["world.ceiling_height"] + world.params.values["world.sensed_gap_offset"]
+    assert (x, y) == pytest.approx((0.0, 0.0))
+    assert z == pytest.approx(plane - 2.5**2 / (2 * accel) - 2.5 * hold_s, abs=1e-6)
+    with pytest.raises(ConfigError, match=r"speed_mps: value 4 m/s .* above the floor"):
+        start_point(world, vertical.model_copy(update={"speed_mps": 4.0}))
