@@ -1,6 +1,8 @@
 """`ivl report` and `ivl export` as people call them."""
 
 import json
+import subprocess
+import sys
 import webbrowser
 from pathlib import Path
 
@@ -71,3 +73,14 @@ def test_export_of_a_trace_does_not_overwrite_it(tmp_path: Path, capsys: pytest.
 def test_a_missing_source_is_wrong_usage(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert run(arguments) == 2
     assert "no such file or run folder" in capsys.readouterr().err
+
+
+def test_without_mcap_the_message_says_what_to_install(learn_run: Path, tmp_path: Path) -> None:
+    program = (
+        "import sys; sys.modules['mcap'] = None; sys.modules['mcap.writer'] = None\n"
+        "from ivl.cli import run\n"
+        f"sys.exit(run(['export', {str(learn_run)!r}, '--out', {str(tmp_path / 'x.mcap')!r}]))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "is not installed: pip install 'ivl[report,sweep]'" in done.stderr

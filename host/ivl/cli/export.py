@@ -45,12 +45,12 @@ def export(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:  # fmt: skip
     """Export a landing; HELP is the text that people see."""
-    flight = resolve(landing, Choice(trial, rollout, gear, gear_set, vehicle, speed, angle))
     path = out or _default_path(landing, kind)
     try:
+        flight = resolve(landing, Choice(trial, rollout, gear, gear_set, vehicle, speed, angle))
         write(flight, path, kind)
     except ModuleNotFoundError as error:
-        raise IvlError(f"{error.name} is not installed: pip install 'ivl[report]'") from error
+        raise IvlError(f"{error.name} is not installed: pip install 'ivl[report,sweep]'") from error
     files = [path, *(copy_layouts(path.parent) if layouts else [])]
     if as_json:
         console.print_json({"title": flight.title, "rows": len(flight), "files": [str(file) for file in files]})
