@@ -34,13 +34,10 @@ static void start(ivl_cf_t *cf, double z_m)
 
 void ivl_cf_world_boot(ivl_cf_t *cf)
 {
-    const double     level[4] = {0.0, 0.0, 0.0, 1.0};
-    const float      off[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-    ivl_sim_world_t *w = ivl_cf_world(cf);
+    const double level[4] = {0.0, 0.0, 0.0, 1.0};
     start(cf, FLOOR_Z_M);
     place_on_floor(cf, (double)cf->set.start_x_m, (double)cf->set.start_y_m, level);
-    ivl_sim_rotor_command(&cf->model, &w->rotor, off);
-    memset(w->rotor.speed_radps, 0, sizeof w->rotor.speed_radps);
+    memset(ivl_cf_world(cf)->rotor.speed_radps, 0, sizeof ivl_cf_world(cf)->rotor.speed_radps);
 }
 
 static void forget_requests(app_t *app)

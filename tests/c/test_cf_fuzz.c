@@ -5,7 +5,7 @@
 
 enum
 {
-    N_CALLS = 20000,
+    N_CALLS = 60000,
     N_REPEATED = 3000
 };
 

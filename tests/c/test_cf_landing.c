@@ -270,11 +270,41 @@ static void test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_ti
     TEST_ASSERT_FALSE(m[0].read(m[0].size(), 1, (uint8_t *)&row));
 }
 
-static void test_a_landing_that_cannot_be_put_to_its_start_is_refused_and_says_so(void)
+static void test_the_recording_of_a_landing_begins_at_its_start(void)
 {
     ivl_sim_model_t model;
     open_noisy(&model);
-    // the core takes angles up to a half turn's quarter; so does the start, but not a distance below the range
+    const ivl_sim_spec_t    spec = {{2.5}, {90.0}, {5.0}, {8.0}, {0.4}, {1}, {0}, {IVL_SIM_START_AT_TRIGGER}, {0}};
+    const ivl_sim_outcome_t o = fly(&spec, 7);
+    size_t                  n;
+    ivl_record_header_t     header;
+    TEST_ASSERT_TRUE(ivl_cf_memories(vehicle, &n)[0].read(0, sizeof header, (uint8_t *)&header));
+    TEST_ASSERT_EQUAL_UINT16((uint16_t)(o.t_trigger_s[0] / model.tick_s + 0.5), header.trigger_row);
+}
+
+static void test_a_landing_may_be_asked_for_on_the_floor(void)
+{
+    ivl_sim_model_t model;
+    open_noisy(&model);
+    const ivl_sim_spec_t spec = {{2.5}, {80.0}, {5.0}, {8.0}, {0.4}, {8}, {9}, {IVL_SIM_START_IMPARTED}, {0}};
+    run_ms(200);
+    TEST_ASSERT_EQUAL_INT(1, (int)read_log("sil", "grounded"));
+    (void)send_policy(7, 5.0f, 0.008f);
+    write_spec(&spec);
+    TEST_ASSERT_EQUAL_UINT8(IVL_PHASE_APPROACH, send_command(IVL_REQUEST_APPROACH, 0.0f, 0.0f, 1.0f, 2.5f, angle_of(&spec)).phase);
+    TEST_ASSERT_EQUAL_INT(0, (int)read_log("sil", "grounded"));
+    wait_for_end(&spec);
+    ivl_sim_outcome_t       outcome;
+    const ivl_sim_outcome_t expected = fly_linked(&model, &spec);
+    (void)read_outcome(&outcome);
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &outcome, sizeof outcome);
+}
+
+static void test_numbers_of_a_start_are_kept_within_their_ranges(void)
+{
+    ivl_sim_model_t model;
+    open_noisy(&model);
+    // a distance out of range is put back into it when it is written
     const ivl_sim_spec_t spec = {{2.5}, {90.0}, {5.0}, {8.0}, {1.0e-9}, {1}, {0}, {IVL_SIM_START_AT_TRIGGER}, {0}};
     (void)fly(&spec, 1);
     TEST_ASSERT_DOUBLE_WITHIN(0.0, 0.5, *(const double *)find_param("sil", "d_ceil")->address);
@@ -305,6 +335,8 @@ int main(void)
     RUN_TEST(test_an_approach_as_flown_begins_where_the_vehicle_hovers_and_is_judged_too);
     RUN_TEST(test_a_vehicle_that_hangs_is_crashed_and_a_reset_makes_it_fly);
     RUN_TEST(test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_time);
-    RUN_TEST(test_a_landing_that_cannot_be_put_to_its_start_is_refused_and_says_so);
+    RUN_TEST(test_the_recording_of_a_landing_begins_at_its_start);
+    RUN_TEST(test_a_landing_may_be_asked_for_on_the_floor);
+    RUN_TEST(test_numbers_of_a_start_are_kept_within_their_ranges);
     return UNITY_END();
 }
