@@ -119,7 +119,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 .PHONY: test
-test: lint test-c san golden test-py test-wire test-sil test-physics test-mujoco test-analysis test-sweep test-report pil sizes-diff ## everything below, set-up and compilers included
+test: lint test-c san golden test-py test-wire test-sil test-links test-physics test-mujoco test-analysis test-sweep test-report pil sizes-diff ## everything below, set-up and compilers included
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
@@ -171,6 +171,15 @@ fuzz: toolchain setup build ## fuzz the packets of the software vehicle (FUZZ_RU
 	@+$(NATIVE) FLAVOUR=fuzz fuzz
 	$(say) 'fuzz: $(FUZZ_RUNS) inputs; new ones are kept in build/fuzz/corpus'
 	@tools/fuzz.sh build/fuzz/fuzz_crtp $(FUZZ_RUNS) $(FUZZ_ARGS)
+
+.PHONY: test-links
+test-links: setup-dev build ## flying over a link: the same bits as in process, lost packets, restarts, rehearsal as a drone
+	$(say) 'test-links: pytest tests/links'
+	@$(BIN)/python -m pytest tests/links $(PYTEST_ARGS)
+
+.PHONY: reliability
+reliability: setup-dev build ## learn over links that lose, delay, freeze and restart; writes docs/RELIABILITY.md (15 min)
+	@$(BIN)/python tools/reliability.py
 
 .PHONY: test-wire
 test-wire: setup-dev build ## CRTP over a CAN bus, and motion capture

@@ -255,7 +255,7 @@ def test_bounds_beyond_the_vehicle_are_refused_before_the_first_flight(server: S
 def test_ctrl_c_stops_cleanly_and_the_resumed_run_has_the_same_bits(
     server: SilProcess, vertical: Experiment, tmp_path: Path
 ) -> None:
-    longer = vertical.model_copy(update={"budget": 80})
+    longer = vertical.model_copy(update={"budget": 40})
     path = tmp_path / "vertical.yaml"
     path.write_text(longer.to_yaml())
     command = [sys.executable, "-m", "ivl", "learn", str(path), "--uri", server.uri, "--out", str(tmp_path / "link")]

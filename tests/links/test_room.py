@@ -207,6 +207,8 @@ def test_lost_camera_before_the_trigger_aborts_and_is_not_scored(
         assert tracking is not None
         assert tracking.room is not None
         room = tracking.room
+        assert source._field is not None
+        source._field._place = None  # type: ignore[attr-defined]  # it stands there since the connection was made
 
         def occlude() -> None:
             while vehicle.phase != Phase.READY:
