@@ -65,6 +65,14 @@ def test_equal_campaigns_give_equal_svg_files(data: Campaign, tmp_path: Path) ->
     assert first.files[0].read_bytes() == second.files[0].read_bytes()
 
 
+def test_fewer_dots_make_smaller_pictures(data: Campaign, tmp_path: Path) -> None:
+    coarse, fine = (
+        paper.draw_all(data, tmp_path / f"{dpi}", suffixes=[".png"], names=["fig09"], dpi=dpi).files[0]
+        for dpi in (50, 100)
+    )
+    assert coarse.stat().st_size < fine.stat().st_size
+
+
 def test_a_campaign_without_landings_says_what_it_cannot_show(data: Campaign, tmp_path: Path) -> None:
     poor = Campaign(data.trials.assign(landing_rate_four_leg_norm=0.1), data.episodes.iloc[:0])
     drawn = paper.draw_all(poor, tmp_path, suffixes=[".svg"])

@@ -124,10 +124,11 @@ def _percent(share: Estimate) -> str:
 
 
 def _separability(parts: dict[Setup, pd.DataFrame]) -> str:
+    chosen = {setup: part for setup, part in parts.items() if setup[-1] == DEFAULT_LEARNER} or parts
     rows = []
-    for setup, part in parts.items():
+    for setup, part in chosen.items():
         points = region.trial_points(part[part["gear"] == PAPER_GEAR])
-        if not points.empty and setup[-1] == DEFAULT_LEARNER:
+        if not points.empty:
             rows += _auc_rows(name(setup), points)
     if not rows:
         return ""

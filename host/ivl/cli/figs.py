@@ -33,6 +33,7 @@ def figs(
     gear: Annotated[str | None, typer.Option(help="Landing gear; default: wide_short.")] = None,
     learner: Annotated[str | None, typer.Option(help="Learner, if there are several; default: bo.")] = None,
     svg: Annotated[bool, typer.Option("--svg", help="SVG instead of PDF.")] = False,
+    dpi: Annotated[int, typer.Option(help="Dots per inch of the PNG files.", min=30, max=1200)] = 200,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
 ) -> None:
     """Draw the figures; HELP is the text that people see."""
@@ -43,7 +44,7 @@ def figs(
     data = campaign.load(runs)
     chosen = {"vehicle": vehicle, "gear_set": gear_set, "gear": gear, "learner": learner}
     suffixes = (".svg" if svg else ".pdf", ".png")
-    drawn = paper.draw_all(data, out or runs[0] / "figures", chosen, suffixes, only)
+    drawn = paper.draw_all(data, out or runs[0] / "figures", chosen, suffixes, only, dpi)
     for name, reason in drawn.left_out.items():
         console.err.print(f"{name}: not drawn: {reason}", style="yellow", highlight=False, soft_wrap=True)
     if as_json:

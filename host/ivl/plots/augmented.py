@@ -26,7 +26,7 @@ class Quantity:
 
 
 def draw_space(
-    data: Campaign, found: pd.DataFrame, quantity: Quantity, title: str, paths: Sequence[Path]
+    data: Campaign, found: pd.DataFrame, quantity: Quantity, title: str, paths: Sequence[Path], dpi: int
 ) -> list[Path]:
     """Points in space on the left; on the right the same points in slices of d that hold as many points each."""
     figure = style.new_figure(7.5, 4.1)
@@ -59,7 +59,7 @@ def draw_space(
             axis.set_xlabel("")
             axis.tick_params(labelbottom=False)
     figure.suptitle(f"{data.title('gear', 'gear_set', 'vehicle', 'learner')}\n{title}", fontsize=style.NORMAL)
-    return style.save(figure, paths)
+    return style.save(figure, paths, dpi)
 
 
 def _inner(found: pd.DataFrame) -> pd.DataFrame:

@@ -26,12 +26,13 @@ _ROWS = (
 """Column, label, limits of the axis (those of the search and a margin), where the paper's simulation ended."""
 
 
-def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
+def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw the cell nearest to the paper's experiment (2.5 m/s, 90 degrees).
 
     Args:
         data: One vehicle, gear set and gear; any number of learners.
         paths: Files to write.
+        dpi: Dots per inch of pictures made of dots.
 
     Raises:
         ConfigError: The run kept no episodes.
@@ -67,7 +68,7 @@ def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
     figure.legend(
         list(named.values()), list(named), loc="outside lower center", ncols=3, fontsize=style.SMALL, frameon=False
     )
-    return style.save(figure, paths)
+    return style.save(figure, paths, dpi)
 
 
 def _nearest(episodes: pd.DataFrame) -> pd.DataFrame:

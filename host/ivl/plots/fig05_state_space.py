@@ -15,12 +15,13 @@ from ivl.plots.campaign import RATE_MAP, Campaign
 NAME = "fig05_state_space"
 
 
-def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
+def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw one point per trial.
 
     Args:
         data: One vehicle, gear set, gear and learner.
         paths: Files to write.
+        dpi: Dots per inch of pictures made of dots.
     """
     found = campaign.points(data)
     figure = style.new_figure(7.5, 3.9)
@@ -36,7 +37,7 @@ def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
         f"{campaign.auc_text(found, 'state')}",
         fontsize=style.NORMAL,
     )
-    return style.save(figure, paths)
+    return style.save(figure, paths, dpi)
 
 
 def color_bar(figure: Figure, image: Any, place: Axes, label: str) -> None:

@@ -15,12 +15,13 @@ _MIDDLE = 0.98
 """Share of the points that the axes show; stray triggers of trials that never learned lie far outside."""
 
 
-def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
+def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw one point per trial, in one panel by landing rate, in the other success and failure apart.
 
     Args:
         data: One vehicle, gear set, gear and learner.
         paths: Files to write.
+        dpi: Dots per inch of pictures made of dots.
     """
     found = campaign.points(data)
     figure = style.new_figure(7.5, 3.5)
@@ -53,7 +54,7 @@ def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
     bar.set_label("landing rate", fontsize=style.NORMAL)
     bar.ax.tick_params(labelsize=style.SMALL)
     figure.suptitle(data.title("gear", "gear_set", "vehicle", "learner"), fontsize=style.NORMAL)
-    return style.save(figure, paths)
+    return style.save(figure, paths, dpi)
 
 
 def limit(axis: Axes, found: pd.DataFrame) -> None:

@@ -8,19 +8,20 @@ import numpy as np
 from ivl.analysis.moment import explained
 from ivl.analysis.region import AUGMENTED
 from ivl.errors import ConfigError
-from ivl.plots import campaign
+from ivl.plots import campaign, style
 from ivl.plots.augmented import Quantity, draw_space
 from ivl.plots.campaign import Campaign
 
 NAME = "fig08_moment"
 
 
-def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
+def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw one point per successful trial; the title says how much of M_yd the cues explain.
 
     Args:
         data: One vehicle, gear set, gear and learner.
         paths: Files to write.
+        dpi: Dots per inch of pictures made of dots.
 
     Raises:
         ConfigError: No trial succeeded.
@@ -39,5 +40,5 @@ def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
         )
     limits = (float(np.floor(moment.min())), float(np.ceil(moment.max())))
     return draw_space(
-        data, found, Quantity("moment_y_Nmm", campaign.LABELS["moment_y_Nmm"], "viridis", limits), title, paths
+        data, found, Quantity("moment_y_Nmm", campaign.LABELS["moment_y_Nmm"], "viridis", limits), title, paths, dpi
     )

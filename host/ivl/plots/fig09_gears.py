@@ -20,12 +20,13 @@ NAME = "fig09_gears"
 ORDER = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
 
 
-def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
+def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw every gear of the run.
 
     Args:
         data: One vehicle, gear set and learner; any number of gears.
         paths: Files to write.
+        dpi: Dots per inch of pictures made of dots.
     """
     present = data.trials["gear"].astype(str).unique()
     gears = [g for g in ORDER if g in present] + sorted(set(present) - set(ORDER))
@@ -46,7 +47,7 @@ def draw(data: Campaign, paths: Sequence[Path]) -> list[Path]:
     bar.ax.tick_params(labelsize=style.SMALL)
     bar.ax.axvline(SOLVED_RATE, color="black", linewidth=1)
     figure.suptitle(data.title("gear_set", "vehicle", "learner"), fontsize=style.NORMAL)
-    return style.save(figure, paths)
+    return style.save(figure, paths, dpi)
 
 
 def _draw_disc(axis: Any, cells: pd.DataFrame) -> Any:

@@ -12,6 +12,7 @@ from ivl.plots import (
     fig07_augmented_space,
     fig08_moment,
     fig09_gears,
+    style,
 )
 from ivl.plots.campaign import SETUP, Campaign
 
@@ -23,7 +24,7 @@ class Figure:
     """One figure: its name, who draws it, and the columns of which it shows a single value."""
 
     name: str
-    draw: Callable[[Campaign, Sequence[Path]], list[Path]]
+    draw: Callable[[Campaign, Sequence[Path], int], list[Path]]
     single: tuple[str, ...]
 
 
@@ -56,6 +57,7 @@ def draw_all(
     chosen: Mapping[str, str | None] | None = None,
     suffixes: Sequence[str] = SUFFIXES,
     names: Sequence[str] | None = None,
+    dpi: int = style.DPI,
 ) -> Drawn:
     """Draw the figures into a folder, each in every format.
 
@@ -66,6 +68,7 @@ def draw_all(
             of a column (gears in Fig. 9, learners in Fig. 4) takes no notice of a choice in it.
         suffixes: Formats.
         names: Figures by name, or the start of it (`fig05`); None: all.
+        dpi: Dots per inch of pictures made of dots.
 
     Raises:
         ConfigError: A choice or a name does not exist, or a file cannot be written.
@@ -85,7 +88,8 @@ def draw_all(
         if lacks:
             drawn.left_out[figure.name] = lacks
         else:
-            drawn.files.extend(figure.draw(part, [folder / f"{figure.name}{suffix}" for suffix in suffixes]))
+            paths = [folder / f"{figure.name}{suffix}" for suffix in suffixes]
+            drawn.files.extend(figure.draw(part, paths, dpi))
     return drawn
 
 

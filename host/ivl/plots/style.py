@@ -13,6 +13,7 @@ from ivl.errors import ConfigError
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 SKY, PURPLE, GREY = "#56B4E9", "#CC79A7", "#7F7F7F"
 SMALL, NORMAL = 8.0, 9.0
+DPI = 200
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
@@ -28,8 +29,13 @@ def finish(axis: Axes) -> None:
         label.set_fontsize(NORMAL)
 
 
-def save(figure: Figure, paths: Sequence[Path]) -> list[Path]:
+def save(figure: Figure, paths: Sequence[Path], dpi: int = DPI) -> list[Path]:
     """Write the figure to each path, in the format of its suffix; equal figures become equal files.
+
+    Args:
+        figure: The figure.
+        paths: Files to write.
+        dpi: Dots per inch of pictures made of dots.
 
     Raises:
         ConfigError: A file cannot be written, or its kind is unknown.
@@ -39,7 +45,7 @@ def save(figure: Figure, paths: Sequence[Path]) -> list[Path]:
         metadata = {"Date": None} if path.suffix == ".svg" else None
         try:
             with mpl.rc_context(settings):
-                figure.savefig(path, dpi=200, metadata=metadata)
+                figure.savefig(path, dpi=dpi, metadata=metadata)
         except (OSError, ValueError) as error:
             raise ConfigError(f"{path}: the figure cannot be written: {error}") from error
     return list(paths)
