@@ -91,7 +91,7 @@ def test_frames_of_others_are_ignored() -> None:
     assert joiner.join(ours) == PING
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(
     sent=st.lists(PACKETS, min_size=1, max_size=20),
     fd=st.booleans(),
@@ -143,7 +143,7 @@ FRAMES = st.builds(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(frames=st.lists(FRAMES, max_size=30), node=st.integers(0, 15), to_vehicle=st.booleans())
 def test_joiner_survives_any_frames(frames: list[can.Message], node: int, to_vehicle: bool) -> None:
     joiner = Joiner(node, to_vehicle)
@@ -421,7 +421,7 @@ def test_policy_of_an_echo_is_told_once() -> None:
     assert telemetry.frames(0.0) == []
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(
     st.lists(
         st.tuples(st.booleans(), st.sampled_from([0x50, 0x51, 0x52, 0xD2, 0x5D]), st.binary(max_size=30)), max_size=20

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ivl.errors import ConfigError
+from ivl.errors import ConfigError, RolloutError
 from ivl.links.packets import Phase
 from ivl.mocap import config as configs
 from ivl.mocap.config import MocapConfig
@@ -234,6 +234,15 @@ def test_nothing_is_asked_where_nothing_flies(phase: Phase) -> None:
     flight = Flight(phase)
     flight.look(Status.LOST, 0.5)
     assert flight.asked == []
+
+
+def test_flight_with_an_abort_is_not_scored() -> None:
+    flight = Flight(Phase.APPROACH)
+    flight.guard.check()
+    flight.look(Status.FROZEN, 0.1)
+    with pytest.raises(RolloutError, match="aborted: why"):
+        flight.guard.check()
+    flight.guard.check()
 
 
 def test_loss_that_lasts_from_flip_into_the_next_approach_aborts_that() -> None:

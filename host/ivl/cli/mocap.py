@@ -81,6 +81,7 @@ def _tracked(config: MocapConfig, uri: str | None) -> Iterator[Mocap]:
         request = None
         if config.system == "simulator":
             room = stack.enter_context(SimulatedRoom(session, config.body))
+            stack.callback(session.write, session.read(["sil.pose_source"]))
             session.write({"sil.pose_source": 1})
             request = room.request(config)
         session.write(config.vehicle_params())

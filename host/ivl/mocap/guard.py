@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from ivl.errors import RolloutError
 from ivl.links.packets import Phase
 from ivl.mocap.watch import Status
 
@@ -39,7 +40,13 @@ class LossGuard:
         self.n_ignored = 0
         """Losses that began in the flip."""
         self.reason = ""
-        """Why an abort was asked last."""
+        """Why an abort was asked since the last `check`; empty if none was."""
+
+    def check(self) -> None:
+        """Once a flight is over: raise RolloutError if an abort was asked for in it, since it must not be scored."""
+        reason, self.reason = self.reason, ""
+        if reason:
+            raise RolloutError(f"aborted: {reason}")
 
     def look(self, status: Status, text: str, now_s: float) -> None:
         """Ask for an abort if it is time to."""
