@@ -243,9 +243,9 @@ format: setup-dev ## format C and Python in place
 	@$(BIN)/clang-format -i $(C_FILES) < /dev/null
 
 .PHONY: bench
-bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 against real time
+bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 and UDP against real time
 	$(say) 'bench'
-	@$(BIN)/ivl bench --pil
+	@$(BIN)/ivl bench --pil --udp
 
 .PHONY: setup-dev
 setup-dev: $(VENV)/.stamp-dev ## add what tests and lint need to .venv

@@ -12,7 +12,7 @@ import numpy as np
 import typer
 
 from ivl.cli import console
-from ivl.errors import IvlError
+from ivl.errors import IvlError, LinkError
 from ivl.links import pil
 from ivl.world import World
 
@@ -28,6 +28,8 @@ Examples:
       without the comparison
   ivl bench --pil
       also with the flight core on an emulated STM32, against real time
+  ivl bench --udp
+      also a software vehicle over UDP: landings a second, and how long the paper's experiment takes to learn
 """
 _MUJOCO_BENCH = Path(__file__).parents[3] / "tests" / "mujoco" / "bench.py"
 
@@ -36,6 +38,7 @@ def bench(
     n: Annotated[int, typer.Option("--rollouts", help="Rollouts to time.", min=100)] = 4000,
     mujoco: Annotated[bool, typer.Option(help="Compare with MuJoCo.")] = True,
     on_chip: Annotated[bool, typer.Option("--pil", help="Time the emulated STM32 in the loop as well.")] = False,
+    over_udp: Annotated[bool, typer.Option("--udp", help="Time a software vehicle over UDP as well.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Measure speed; HELP is the text that people see."""
@@ -44,6 +47,8 @@ def bench(
     result["ratio_to_mujoco"] = result["rollouts_per_s_per_core"] / compare() if compare else None
     if on_chip:
         result |= pil.measure()
+    if over_udp:
+        result |= _udp_rates()
     if as_json:
         console.print_json(result)
     else:
@@ -65,6 +70,19 @@ def measure(world: World, n: int) -> dict[str, Any]:
         best_s = min(best_s, time.thread_time() - began)
         steps = int(outcomes.n_steps.sum())
     return {"rollouts_per_s_per_core": n / best_s, "steps_per_s_per_core": steps / best_s}
+
+
+def _udp_rates() -> dict[str, float]:
+    """Figures of the link.
+
+    Raises:
+        LinkError: cflib is not installed.
+    """
+    try:
+        from ivl.links.bench import measure as measure_link
+    except ImportError as error:
+        raise LinkError(f"--udp needs cflib: pip install 'ivl[link]' ({error})") from error
+    return measure_link()
 
 
 def _mujoco_rate() -> Callable[[], float]:
