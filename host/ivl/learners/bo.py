@@ -98,7 +98,8 @@ class BOLearner(Learner):
         uniform = self._uniform(self.options.n_uniform, self._rng)
         elite = np.argsort(-gp.fitted, kind="stable")[: self.options.n_elite]
         centers = np.vstack([self._x[elite], np.tile(self._best, (len(elite), 1))])
-        near = self._cloud(centers[self._rng.integers(len(centers), size=self.options.n_near)], 1.0, self._rng)
+        chosen = self._rng.integers(len(centers), size=self.options.n_near)
+        near = self._cloud(centers[chosen], self.options.n_near, 1.0, self._rng)
         return np.vstack([uniform, near])
 
     def _safest(self, gp: GaussianProcess) -> FloatArray:
@@ -111,16 +112,16 @@ class BOLearner(Learner):
         for halvings in range(_SEARCH_ROUNDS + 1):
             best = points[gp.safest(points, self.options.caution)]
             if halvings < _SEARCH_ROUNDS:
-                points = np.vstack([best, self._cloud(np.tile(best, (150, 1)), 0.5**halvings, rng)])
+                points = np.concatenate([best[None], self._cloud(best, 150, 0.5**halvings, rng)])
         return np.asarray(best)
 
     def _uniform(self, n: int, rng: np.random.Generator) -> FloatArray:
         return rng.uniform(self._box[0], self._box[1], (n, self.dim))
 
-    def _cloud(self, centers: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
-        """A normal draw about each centre, `share` of the jitter wide, moved into the box."""
+    def _cloud(self, centers: FloatArray, n: int, share: float, rng: np.random.Generator) -> FloatArray:
+        """Draw n normal points, about one centre or each its own, `share` of the jitter wide, moved into the box."""
         width = np.minimum(share * self.options.jitter * self._hyper.lengths, self._box[1] - self._box[0])
-        return np.asarray(np.clip(centers + width * rng.standard_normal(centers.shape), self._box[0], self._box[1]))
+        return np.asarray(np.clip(centers + width * rng.standard_normal((n, self.dim)), self._box[0], self._box[1]))
 
     def _scale(self, theta: FloatArray) -> FloatArray:
         return np.asarray((theta - self.mu0) / self.sigma0)

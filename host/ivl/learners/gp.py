@@ -114,7 +114,7 @@ class GaussianProcess:
         u = (x - self._center) / self.hyper.lengths
         rows = np.ones((len(x), x.shape[1] + 2), dtype=np.float32)
         rows[:, :-2] = u
-        rows[:, -2] = -0.5 * (u**2).sum(axis=1)
+        rows[:, -2] = -0.5 * np.einsum("ij,ij->i", u, u)
         return rows
 
 
@@ -132,13 +132,13 @@ class _Likelihood:
     def __init__(self, x: FloatArray, y: FloatArray) -> None:
         self._n = len(x)
         difference = x.T[:, :, None] - x.T[:, None, :]
-        self._half_square = -0.5 * difference**2  # (dim, n, n)
+        self._half_square = -0.5 * (difference**2).reshape(x.shape[1], -1)  # (dim, n n)
         self._bordered = np.zeros((self._n + 1, self._n + 1))
         self._y, self._y_square = y, float(y @ y)
 
     def __call__(self, hyper: Hyper) -> float:
         noise, n, bordered = hyper.noise + _JITTER, self._n, self._bordered
-        exponent = np.tensordot(hyper.lengths**-2.0, self._half_square, axes=1)
+        exponent = (hyper.lengths**-2.0 @ self._half_square).reshape(n, n)
         bordered[:n, :n] = np.exp(np.maximum(exponent, _EXPONENT_MIN, out=exponent), out=exponent)
         bordered.flat[:: n + 2] += noise
         bordered[n, :n] = self._y
