@@ -82,6 +82,19 @@ def test_learning_stores_the_same_bits_as_in_process(server: SilProcess, vertica
     assert len(journal) == vertical.budget
 
 
+def test_another_world_at_the_other_end_is_told(vertical: Experiment, plan: Plan) -> None:
+    other = vertical.model_copy(update={"gear_set": "table1"})
+    said: list[str] = []
+    with SilProcess(other.make_world()) as server:
+        with CrazyflieSource(server.uri, vertical, Options(say=said.append)) as source:
+            next(source.fly(first(plan, 1)))
+        assert [line for line in said if "simulates another world than paper_vertical" in line]
+        said.clear()
+        with CrazyflieSource(server.uri, other, Options(say=said.append)):
+            pass
+        assert said == []
+
+
 def test_software_vehicle_gets_its_time_back(server: SilProcess, vertical: Experiment, plan: Plan) -> None:
     fly_both(server, vertical, first(plan, 1))
     assert server.get("sil.lockstep") == 0
@@ -217,7 +230,7 @@ def test_policy_is_not_flown_when_the_vehicle_echoes_another(
         with pytest.raises(RolloutError, match="discarded 2 times in a row"):
             next(source.fly(first(plan, 1)))
         assert source.n_discarded == 2
-        assert server.get("sil.episode") == 0, "no landing was begun"
+        assert server.get("sil.episode") == 1, "no landing was begun after the one that compares worlds"
     assert any("not in force" in line for line in said)
 
 

@@ -104,6 +104,7 @@ def test_landing_is_flown_from_the_floor_and_judged_as_the_simulator_does(
     assert outcome["vz_trigger_mps"][0] == pytest.approx(known["vz_trigger_mps"][0], abs=0.05)
     assert outcome["d_min_m"][0] == pytest.approx(known["d_min_m"][0], abs=0.02)
     assert landing.snapshot.policy_seq == landing.policy_seq == landing.recording.policy_seq
+    (_,) = source.fly(plan_of(GOOD))
     (saved,) = (tmp_path / "recordings").iterdir()
     assert len(saved.read_text().splitlines()) == 1 + len(landing.recording.rows)
     assert vehicle_of(source).session.read(["supervisor.tmblChckEn"])["supervisor.tmblChckEn"] == 1

@@ -32,6 +32,7 @@ from ivl.source import Flown, Plan
 ATTEMPTS_MAX = 10
 _SIL_CHECKS = ("tables", "link", "phase")
 _AGAIN_S, _IDLE_S = 0.2, 3.0
+_OTHER_WORLD = "outcomes will differ from those in process (start it with: ivl sil --experiment FILE)"
 JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
 
 
@@ -60,6 +61,21 @@ class CrazyflieSource:
         self.n_discarded = 0
         """Flights that were not scored and were flown again."""
         self._connect()
+        try:
+            if self._is_sil and not self._flies_our_world():
+                self.options.say(f"{uri} simulates another world than {experiment.name}: {_OTHER_WORLD}")
+        except BaseException:
+            self.close()
+            raise
+
+    def _flies_our_world(self) -> bool:
+        """Whether one landing there has the bits that it has here."""
+        policy = self._experiment.policy
+        probe = Rollout(policy.rrev_c_per_s.mu0, policy.moment_y_Nmm.mu0)
+        spec = (self._experiment.speed_mps, self._experiment.angle_deg, probe.rrev_c_per_s, probe.moment_y_Nmm)
+        here = self.world.rollouts(*spec, seed=0, stream=0, start=self._experiment.start, threads=1)
+        there = self._fly_until_known(np.zeros(1, dtype=np.intp), probe, is_probe=True)
+        return there.outcomes.tobytes() == here.tobytes()
 
     # ---- RolloutSource
 
@@ -102,16 +118,19 @@ class CrazyflieSource:
         vehicle, field = self._vehicle, self._field
         if vehicle is None or field is None:
             raise LinkError(f"{self.uri}: the link is closed")
-        landing = Episode(vehicle, self._experiment).fly(field, rollout)
-        self._keep(landing)
-        return landing
+        return Episode(vehicle, self._experiment).fly(field, rollout)
 
-    def _fly_until_known(self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout) -> Flown:
+    def _fly_until_known(
+        self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout, is_probe: bool = False
+    ) -> Flown:
         for attempt in range(1, ATTEMPTS_MAX + 1):
             try:
                 if self._vehicle is None:
                     self._return()
-                outcome = self.fly_one(rollout).outcome
+                landing = self.fly_one(rollout)
+                outcome = landing.outcome
+                if not is_probe:
+                    self._keep(landing)
                 good = bool(valid(outcome).all())
                 reason = "" if good else f"simulation: {self.world.end_reason(int(outcome['end_reason'][0]))}"
                 return Flown(index, outcome, reason)
