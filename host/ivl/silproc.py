@@ -66,6 +66,7 @@ class SilProcess:
         vehicles: int = 1,
         seed: int = 0,
         port: int = 0,
+        bind: str = "127.0.0.1",
         faults: Mapping[str, float] | None = None,
     ) -> None:
         """Say what is to be started.
@@ -77,11 +78,13 @@ class SilProcess:
             vehicles: How many, each on a port of its own.
             seed: Of the sensors' noise; vehicle n has seed + n.
             port: UDP port of the first vehicle; 0 takes free ones.
+            bind: Address to listen on.
             faults: Faults of the link by name, for example `{"loss": 0.05}`.
         """
         self._model = model_text(world)
         self._vehicles, self._port = vehicles, port
         self._arguments = ["--speed", "max" if speed is None else repr(speed), "--seed", str(seed)]
+        self._arguments += ["--bind", bind]
         self._arguments += ["--lockstep"] if lockstep else []
         for name, value in (faults or {}).items():
             self._arguments += ["--fault", f"{name}={value!r}"]

@@ -203,26 +203,37 @@ static void serve_control(ivl_crtp_loop_t *loop)
 
 static void own_changed(void *context)
 {
-    ivl_crtp_loop_t *loop = context;
-    ivl_crtp_own_t  *own = &loop->crtp.own;
+    ivl_crtp_loop_t      *loop = context;
+    const ivl_crtp_own_t *own = &loop->crtp.own;
     loop->faults.cfg = own->fault;
-    if (own->freeze_ms > 0u)
+    if (own->freeze_ms != loop->freeze_ms)
     {
+        loop->freeze_ms = own->freeze_ms;
         loop->frozen_until_us = wall_us() + 1000u * (uint64_t)own->freeze_ms;
     }
-    loop->cut_ms = (own->cut_ms > 0u) ? own->cut_ms : loop->cut_ms;
-    own->freeze_ms = 0;
-    own->cut_ms = 0;
 }
 
-// begun here and not where it was asked for, so that the answer to the request still gets through
-static void begin_cut(ivl_crtp_loop_t *loop)
+// both read 0 again when they are over
+static void begin_and_end(ivl_crtp_loop_t *loop)
 {
-    if (loop->cut_ms > 0u)
+    ivl_crtp_own_t *own = &loop->crtp.own;
+    own->freeze_ms = 0;
+    loop->freeze_ms = 0;
+    // begun here and not where it was asked for, so that the answer to the request still gets through
+    if (own->cut_ms != loop->cut_ms)
     {
-        loop->faults.cut_until_us = loop->now_us + 1000u * (uint64_t)loop->cut_ms;
+        loop->cut_ms = own->cut_ms;
+        loop->faults.cut_until_us = loop->now_us + 1000u * (uint64_t)own->cut_ms;
+    }
+    if (loop->now_us >= loop->faults.cut_until_us)
+    {
+        own->cut_ms = 0;
         loop->cut_ms = 0;
     }
+}
+
+static void tell_faults(ivl_crtp_loop_t *loop)
+{
     ivl_crtp_own_t *own = &loop->crtp.own;
     own->n_lost = loop->faults.n_lost;
     own->n_duplicated = loop->faults.n_duplicated;
@@ -295,9 +306,10 @@ static void turn(ivl_crtp_loop_t *loop)
     {
         return;
     }
-    begin_cut(loop);
+    begin_and_end(loop);
     receive(loop);
     deliver_delayed(loop);
+    tell_faults(loop);
     take_waiting(loop);
     advance(loop);
 }

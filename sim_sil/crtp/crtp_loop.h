@@ -25,7 +25,7 @@ typedef struct
     int                fd, control_fd;
     uint64_t           now_us, frozen_until_us, refilled_us;
     double             credit, packets_per_s;  ///< packets that may be sent now
-    uint32_t           cut_ms;                 ///< to begin
+    uint32_t           freeze_ms, cut_ms;      ///< that have begun
 } ivl_crtp_loop_t;
 
 /// @param[out] error  one line, if the result is false

@@ -157,9 +157,11 @@ static void handle_read(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet)
 }
 
 // The answer to run_to_ms waits until the vehicle is there.  A repetition of the request gets no second answer; another request ends the wait.
-static void hold(ivl_crtp_t *crtp, const ivl_crtp_packet_t *reply)
+void ivl_crtp_params_hold(ivl_crtp_t *crtp, const ivl_crtp_packet_t *reply)
 {
-    if (crtp->is_held && ((crtp->held.size != reply->size) || (memcmp(crtp->held.data, reply->data, reply->size) != 0)))
+    const bool is_same = (crtp->held.channel == reply->channel) && (crtp->held.size == reply->size) &&
+                         (memcmp(crtp->held.data, reply->data, reply->size) == 0);
+    if (crtp->is_held && !is_same)
     {
         ivl_crtp_send(crtp, &crtp->held);
     }
@@ -195,7 +197,7 @@ static void handle_write(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet)
     }
     if (ivl_crtp_params_write(crtp, id, value))
     {
-        hold(crtp, packet);
+        ivl_crtp_params_hold(crtp, packet);
         return;
     }
     // what was brought into range is seen in the answer

@@ -18,7 +18,7 @@ typedef enum
 
 #define EXTENDED_PERSISTENT 1u
 
-static ivl_crtp_error_t try_set(ivl_crtp_t *crtp, const char *group, const char *name, uint8_t type, ivl_crtp_reader_t *r)
+static ivl_crtp_error_t try_set(ivl_crtp_t *crtp, const char *group, const char *name, uint8_t type, ivl_crtp_reader_t *r, bool *waits)
 {
     uint16_t id;
     if (!ivl_crtp_toc_find(&crtp->params.toc, group, name, &id))
@@ -35,7 +35,7 @@ static ivl_crtp_error_t try_set(ivl_crtp_t *crtp, const char *group, const char 
     {
         return IVL_CRTP_EACCES;
     }
-    (void)ivl_crtp_params_write(crtp, id, value);
+    *waits = ivl_crtp_params_write(crtp, id, value);
     return IVL_CRTP_OK;
 }
 
@@ -54,7 +54,13 @@ static void set_by_name(ivl_crtp_t *crtp, ivl_crtp_reader_t *r)
     ivl_crtp_put_u8(&reply, SET_BY_NAME);
     ivl_crtp_put_text(&reply, group);
     ivl_crtp_put_text(&reply, name);
-    ivl_crtp_put_u8(&reply, (uint8_t)try_set(crtp, group, name, type, r));
+    bool waits = false;
+    ivl_crtp_put_u8(&reply, (uint8_t)try_set(crtp, group, name, type, r, &waits));
+    if (waits)
+    {
+        ivl_crtp_params_hold(crtp, &reply);
+        return;
+    }
     ivl_crtp_send(crtp, &reply);
 }
 

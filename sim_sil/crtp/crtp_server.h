@@ -71,7 +71,7 @@ typedef struct
 {
     ivl_crtp_time_t      time;
     ivl_crtp_fault_cfg_t fault;
-    uint32_t             freeze_ms, cut_ms;             ///< written: begin; 0 again at once
+    uint32_t             freeze_ms, cut_ms;             ///< written: begin; 0 when they are over
     uint32_t             n_rx, n_tx, n_bad, n_foreign;  ///< packets: from the client, to it, malformed or refused, from others
     uint32_t             n_lost, n_duplicated, n_reordered;
 } ivl_crtp_own_t;
@@ -130,6 +130,8 @@ void ivl_crtp_params_step(ivl_crtp_t *crtp);
 void ivl_crtp_params_misc(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet);
 /// Copies a value into a parameter and tells who must know.  @return true if the answer has to wait
 bool ivl_crtp_params_write(ivl_crtp_t *crtp, uint16_t id, const uint8_t *value);
+/// Keeps the answer until the vehicle is where it has to run to.
+void ivl_crtp_params_hold(ivl_crtp_t *crtp, const ivl_crtp_packet_t *reply);
 /// Bytes of a value; 0 for an unknown type.
 size_t ivl_crtp_param_size(uint8_t type);
 

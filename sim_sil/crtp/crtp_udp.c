@@ -122,28 +122,21 @@ static bool take_error(int fd, uint64_t *peer)
 
 ivl_crtp_udp_event_t ivl_crtp_udp_take(int fd, uint8_t *bytes, size_t capacity, size_t *size, uint64_t *peer)
 {
+    struct sockaddr_in address;
+    socklen_t          length = sizeof address;
     // a pending error makes one call fail, the packets behind it are still there
     for (int attempt = 0; attempt < 2; attempt++)
     {
-        struct sockaddr_in address;
-        socklen_t          length = sizeof address;
-        const ssize_t      n = recvfrom(fd, bytes, capacity, MSG_DONTWAIT | MSG_TRUNC, (struct sockaddr *)&address, &length);
+        const ssize_t n = recvfrom(fd, bytes, capacity, MSG_DONTWAIT | MSG_TRUNC, (struct sockaddr *)&address, &length);
         if (n >= 0)
         {
             *size = (size_t)n;
             *peer = number_of(&address);
             return IVL_CRTP_UDP_PACKET;
         }
-        if ((errno == EAGAIN) || (errno == EWOULDBLOCK))
-        {
-            return IVL_CRTP_UDP_NOTHING;
-        }
-        if (take_error(fd, peer))
-        {
-            return IVL_CRTP_UDP_GONE;
-        }
     }
-    return IVL_CRTP_UDP_NOTHING;
+    // looked at even if no call has failed: a failing sendto takes the error away and leaves its entry here
+    return take_error(fd, peer) ? IVL_CRTP_UDP_GONE : IVL_CRTP_UDP_NOTHING;
 }
 
 void ivl_crtp_udp_send(int fd, uint64_t peer, const void *bytes, size_t size)

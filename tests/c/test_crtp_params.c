@@ -255,6 +255,16 @@ static void test_lockstep_run_is_answered_when_it_is_there(void)
     TEST_ASSERT_FALSE(server.own.time.running);
 }
 
+static void test_lockstep_run_by_name_is_answered_when_it_is_there_too(void)
+{
+    start_lockstep();
+    expect_answer("2f0073696c0072756e5f746f5f6d73000a02000000", "");
+    ivl_crtp_step(&server);
+    TEST_ASSERT_EQUAL_STRING("", sent);
+    ivl_crtp_step(&server);
+    TEST_ASSERT_EQUAL_STRING("2f0073696c0072756e5f746f5f6d730000", sent);
+}
+
 static void test_lockstep_repetition_has_one_answer_and_a_new_request_ends_the_wait(void)
 {
     start_lockstep();
@@ -363,6 +373,7 @@ int main(void)
     RUN_TEST(test_a_change_by_the_vehicle_is_told);
     RUN_TEST(test_fault_parameters_are_brought_into_range);
     RUN_TEST(test_lockstep_run_is_answered_when_it_is_there);
+    RUN_TEST(test_lockstep_run_by_name_is_answered_when_it_is_there_too);
     RUN_TEST(test_lockstep_repetition_has_one_answer_and_a_new_request_ends_the_wait);
     RUN_TEST(test_lockstep_run_ends_early_where_the_client_wants);
     RUN_TEST(test_leaving_lockstep_answers_who_waits);

@@ -27,6 +27,7 @@ static ivl_cf_t               *cf;
 static ivl_crtp_t              server, fresh;
 static ivl_crtp_param_state_t *fresh_state;
 static unsigned                n_sent;
+static uint64_t                n_datagrams, n_steps;
 
 // every byte of an answer is looked at, so that one that was never written is seen
 static void look_at(void *context, const ivl_crtp_packet_t *packet)
@@ -66,6 +67,7 @@ static void play_datagram(const uint8_t *bytes, size_t size)
         copy[i] = bytes[i];
     }
     n_sent = 0;
+    n_datagrams++;
     ivl_crtp_receive(&server, copy, size);
     assert(n_sent <= 3u);
     free(copy);
@@ -80,6 +82,7 @@ static unsigned play_steps(unsigned wanted, unsigned left)
         ivl_crtp_step(&server);
     }
     assert(ivl_crtp_time_ms(&server) == before_ms + n);
+    n_steps += n;
     return left - n;
 }
 
@@ -119,6 +122,11 @@ static void fail(const char *error)
     exit(2);
 }
 
+static void tell_counts(void)
+{
+    fprintf(stderr, "fuzz_crtp: %llu datagrams, %llu ms of the vehicle\n", (unsigned long long)n_datagrams, (unsigned long long)n_steps);
+}
+
 static void open_vehicle(void)
 {
     char error[200];
@@ -146,6 +154,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
     {
         fail(error);
     }
+    atexit(tell_counts);
     open_vehicle();
     if (!ivl_crtp_open(&server, cf, &HOST, error, sizeof error))
     {
