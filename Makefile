@@ -158,7 +158,7 @@ test-py: setup-dev build ## tests of the Python package
 	@$(BIN)/python -m pytest tests/py $(PYTEST_ARGS)
 
 .PHONY: test-sil
-test-sil: setup-dev build toolchain ## the software vehicle with unmodified cflib, and a short fuzz of its packets
+test-sil: setup-dev build toolchain qt-libraries ## the software vehicle with unmodified cflib, and a short fuzz of its packets
 	@+$(NATIVE) FLAVOUR=san sil
 	@tools/apt_install.sh $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
 	@+$(NATIVE) FLAVOUR=fuzz fuzz
@@ -263,6 +263,11 @@ cross-toolchain: ## install what compiles for the vehicle and emulates it (Debia
 .PHONY: chromium
 chromium: ## install the browser that the reports are tested in (Debian; needs root only if it is missing)
 	@tools/apt_install.sh chromium:chromium
+
+.PHONY: qt-libraries
+qt-libraries: setup-dev ## install what cfclient's windows are drawn with (Debian; needs root only if something is missing)
+	@$(BIN)/python -c 'import PyQt6.QtOpenGLWidgets' 2> /dev/null || tools/apt_install.sh \
+	    :libdbus-1-3 :libegl1 :libfontconfig1 :libgl1 :libglib2.0-0 :libxkbcommon0
 
 .PHONY: clean
 clean: ## remove what was compiled
