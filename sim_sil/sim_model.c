@@ -90,6 +90,30 @@ static double reach(const ivl_sim_model_t *model)
     return farthest;
 }
 
+/// Butterworth by the bilinear transform.                                                             [MODEL eq. 9.17]
+/// @return false if the corner is not below half the rate
+static bool derive_lowpass(double cutoff_hz, double rate_hz, ivl_sim_lowpass_t *filter)
+{
+    filter->on = isfinite(cutoff_hz);
+    if (!filter->on)
+    {
+        return true;
+    }
+    if (!(cutoff_hz < 0.5 * rate_hz))
+    {
+        return false;
+    }
+    double s, c;
+    ivl_sim_sincos(IVL_SIM_PI * cutoff_hz / rate_hz, &s, &c);
+    const double k = s / c, norm = 1.0 / (1.0 + sqrt(2.0) * k + k * k);
+    filter->b[0] = k * k * norm;
+    filter->b[1] = 2.0 * filter->b[0];
+    filter->b[2] = filter->b[0];
+    filter->a[0] = 2.0 * (k * k - 1.0) * norm;
+    filter->a[1] = (1.0 - sqrt(2.0) * k + k * k) * norm;
+    return true;
+}
+
 /// The flight core knows the vehicle that it flies: its copy of these numbers follows from the world's.
 static void tell_firmware(ivl_sim_model_t *model)
 {
@@ -142,5 +166,14 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
         return false;
     }
     model->tick_s = 1.0 / (double)model->firmware.tick_hz;
+    model->has_readings = raw->rrev_rate_hz > 0.0 || raw->range_rate_hz > 0.0 || raw->flow_rate_hz > 0.0;
+    const double rate = (double)model->firmware.tick_hz;
+    if (!derive_lowpass(raw->sense_gyro_cutoff_hz, rate, &model->gyro_lowpass) ||
+        !derive_lowpass(raw->sense_accel_cutoff_hz, rate, &model->accel_lowpass))
+    {
+        snprintf(error, error_size, "sense.gyro_cutoff, sense.accel_cutoff: %g and %g Hz: must be below half of firmware.tick_hz, %g Hz",
+                 raw->sense_gyro_cutoff_hz, raw->sense_accel_cutoff_hz, 0.5 * rate);
+        return false;
+    }
     return true;
 }

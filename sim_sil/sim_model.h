@@ -47,21 +47,30 @@ typedef struct
     double   moment_pivot_kgm2;         ///< moment of inertia about the hip
 } ivl_sim_leg_model_t;
 
+/// Second-order low-pass: y = b0 x0 + b1 x1 + b2 x2 - a0 y1 - a1 y2.
+typedef struct
+{
+    bool   on;
+    double b[3], a[2];
+} ivl_sim_lowpass_t;
+
 typedef struct
 {
     ivl_sim_params_t    raw;
     ivl_sim_leg_model_t leg;
     ivl_sim_plate_t     plate[IVL_SIM_PLATES];
-    double         rotor_x_m[IVL_SIM_MOTORS], rotor_y_m[IVL_SIM_MOTORS], rotor_spin[IVL_SIM_MOTORS];  ///< spin: sign of the torque on B
-    double         mass_total_kg;
-    double         rotor_speed_max_radps;
-    double         rotor_speed_hover_radps;
-    double         leg_frequency_radps;  ///< of a leg swinging about its hip, body held
-    double         leg_damping_ratio;
-    double         reach_m;  ///< largest distance of any point of the vehicle from the body origin
-    ivl_cfg_t      firmware;
-    double         tick_s;  ///< of the firmware
-    ivl_sim_core_t core;    ///< where the firmware runs
+    double            rotor_x_m[IVL_SIM_MOTORS], rotor_y_m[IVL_SIM_MOTORS], rotor_spin[IVL_SIM_MOTORS];  ///< spin: sign of the torque on B
+    double            mass_total_kg;
+    double            rotor_speed_max_radps;
+    double            rotor_speed_hover_radps;
+    double            leg_frequency_radps;  ///< of a leg swinging about its hip, body held
+    double            leg_damping_ratio;
+    double            reach_m;  ///< largest distance of any point of the vehicle from the body origin
+    ivl_cfg_t         firmware;
+    double            tick_s;  ///< of the firmware
+    ivl_sim_lowpass_t gyro_lowpass, accel_lowpass;
+    bool              has_readings;  ///< some sensor of one number beside the state estimate
+    ivl_sim_core_t    core;          ///< where the firmware runs
 } ivl_sim_model_t;
 
 /// Checks raw parameters and derives the model.

@@ -69,6 +69,38 @@
     X(sense, gyro_max, radps, "rad/s", 1.0, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "full scale of the gyro; readings clip there") \
     X(sense, accel_noise, mps2, "m/s^2", 0.0, 50.0, 0.0, "standard deviation of each component of the specific force") \
     X(sense, accel_max, mps2, "m/s^2", 1.0, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "full scale of the accelerometer; readings clip there") \
+    X(sense, position_resolution, m, "m", 0.0, 0.1, 0.0, "positions are multiples of this; 0: not rounded") \
+    X(sense, pose_drop, norm, "1", 0.0, 1.0, 0.0, "chance that a pose sample is lost: the last one stays") \
+    X(sense, inertial, norm, "1", 0.0, 1.0, 0.0, "1: no external pose; position and velocity by dead reckoning from a hover, at each tick") \
+    X(sense, start_position_error, m, "m", 0.0, 5.0, 0.0, "dead reckoning: standard deviation of each coordinate at the start; that of z is the ceiling's, too") \
+    X(sense, start_velocity_error, mps, "m/s", 0.0, 2.0, 0.0, "dead reckoning: standard deviation of each component of the velocity at the start") \
+    X(sense, start_attitude_error, rad, "rad", 0.0, 0.5, 0.0, "integrated attitude: standard deviation of each component at the start") \
+    X(sense, attitude_integrated, norm, "1", 0.0, 1.0, 0.0, "1: the attitude is integrated from the gyro as delivered, clipped where that is") \
+    X(sense, gyro_bias, radps, "rad/s", 0.0, 1.0, 0.0, "standard deviation of each component's offset, drawn once a rollout") \
+    X(sense, gyro_cutoff, hz, "Hz", 1.0, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "corner of the gyro's low-pass (second order, Butterworth); .inf: none") \
+    X(sense, accel_bias, mps2, "m/s^2", 0.0, 5.0, 0.0, "standard deviation of each component's offset, drawn once a rollout") \
+    X(sense, accel_cutoff, hz, "Hz", 1.0, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "corner of the accelerometer's low-pass; .inf: none") \
+    X(rrev, rate, hz, "Hz", 0.0, 500.0, 0.0, "sensor of RREV, standing for a camera: samples per second; 0: there is none") \
+    X(rrev, delay, s, "s", 0.0, 0.06, 0.0, "from the sampling instant to the arrival") \
+    X(rrev, noise, per_s, "1/s", 0.0, 10.0, 0.0, "standard deviation: constant part") \
+    X(rrev, noise_rel, norm, "1", 0.0, 1.0, 0.0, "and part of the value; the two are independent") \
+    X(rrev, resolution, per_s, "1/s", 0.0, 1.0, 0.0, "values are multiples of this; 0: not rounded") \
+    X(rrev, max, per_s, "1/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
+    X(rrev, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
+    X(range, rate, hz, "Hz", 0.0, 500.0, 0.0, "ranging sensor along b_z: samples per second; 0: there is none") \
+    X(range, delay, s, "s", 0.0, 0.06, 0.0, "from the sampling instant to the arrival") \
+    X(range, noise, m, "m", 0.0, 1.0, 0.0, "standard deviation of a sample") \
+    X(range, bias, m, "m", 0.0, 1.0, 0.0, "standard deviation of the offset, drawn once a rollout") \
+    X(range, resolution, m, "m", 0.0, 0.1, 0.0, "values are multiples of this; 0: not rounded") \
+    X(range, min, m, "m", 0.0, 1.0, 0.0, "a value below this is told as invalid") \
+    X(range, max, m, "m", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
+    X(range, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
+    X(flow, rate, hz, "Hz", 0.0, 500.0, 0.0, "flow sensor that faces up, lateral flow only: samples per second; 0: there is none") \
+    X(flow, delay, s, "s", 0.0, 0.06, 0.0, "from the sampling instant to the arrival") \
+    X(flow, noise, radps, "rad/s", 0.0, 10.0, 0.0, "standard deviation of a sample") \
+    X(flow, resolution, radps, "rad/s", 0.0, 1.0, 0.0, "values are multiples of this; 0: not rounded") \
+    X(flow, max, radps, "rad/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
+    X(flow, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
     X(start, hold_time, s, "s", 0.0, 5.0, 0.39, "flown start: time at full speed that is left, before the ceiling would be reached") \
     X(end, contact_time, s, "s", 0.01, 10.0, 1.0, "a rollout ends this long after the first contact") \
     X(end, missed_time, s, "s", 0.1, 10.0, 2.25, "or this long after the trigger, without a contact") \

@@ -18,6 +18,18 @@ typedef enum
     IVL_SIM_DRAW_GYRO,          ///< gyro noise
     IVL_SIM_DRAW_ACCEL,         ///< accelerometer noise
     IVL_SIM_DRAW_THRUST,        ///< per-motor scatter of the thrust constant
+    IVL_SIM_DRAW_POSE_DROP,     ///< pose samples that are lost
+    IVL_SIM_DRAW_GYRO_BIAS,     ///< offsets of a rollout
+    IVL_SIM_DRAW_ACCEL_BIAS,
+    IVL_SIM_DRAW_START_POSITION,  ///< what dead reckoning starts with
+    IVL_SIM_DRAW_START_VELOCITY,
+    IVL_SIM_DRAW_START_ATTITUDE,
+    IVL_SIM_DRAW_RREV,  ///< noise of the sensors of one number; their offset is the last index
+    IVL_SIM_DRAW_RANGE,
+    IVL_SIM_DRAW_FLOW,
+    IVL_SIM_DRAW_RREV_DROP,
+    IVL_SIM_DRAW_RANGE_DROP,
+    IVL_SIM_DRAW_FLOW_DROP,
 } ivl_sim_draw_t;
 
 typedef struct

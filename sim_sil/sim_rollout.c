@@ -55,9 +55,10 @@ bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_
 void ivl_sim_outcome_clear(ivl_sim_outcome_t *o)
 {
     memset(o, 0, sizeof *o);
-    double *const fields[] = {o->t_trigger_s,    o->t_impact_s,         o->t_end_s,       o->theta_impact_deg, o->vx_trigger_mps,
-                              o->vz_trigger_mps, o->rate_trigger_radps, o->vx_impact_mps, o->vz_impact_mps,    o->rate_impact_radps,
-                              o->d_trigger_m,    o->rrev_trigger,       o->of_y_trigger,  o->d_min_m};
+    double *const fields[] = {o->t_trigger_s,       o->t_impact_s,         o->t_end_s,       o->theta_impact_deg, o->vx_trigger_mps,
+                              o->vz_trigger_mps,    o->rate_trigger_radps, o->vx_impact_mps, o->vz_impact_mps,    o->rate_impact_radps,
+                              o->d_trigger_m,       o->rrev_trigger,       o->of_y_trigger,  o->d_min_m,          o->d_true_trigger_m,
+                              o->d_sigma_trigger_m, o->d_valid_norm};
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
     {
         fields[i][0] = (double)NAN;
@@ -65,14 +66,18 @@ void ivl_sim_outcome_clear(ivl_sim_outcome_t *o)
 }
 
 /// Truth at the tick at which the flight core triggered, and what it saw.
-static void note_trigger(const ivl_sim_kin_t *before, double t_s, const ivl_state_t *firmware, ivl_sim_outcome_t *o)
+static void note_trigger(const ivl_sim_kin_t *before, const ivl_sim_world_t *world, ivl_sim_outcome_t *o)
 {
+    const ivl_state_t      *firmware = &world->firmware;
+    const ivl_sim_params_t *raw = &world->model->raw;
     o->triggered[0] = 1;
-    o->t_trigger_s[0] = t_s;
+    o->t_trigger_s[0] = world->t_s;
     o->vx_trigger_mps[0] = before->v_WB_mps[0];
     o->vz_trigger_mps[0] = before->v_WB_mps[2];
     o->rate_trigger_radps[0] = -before->w_B_radps[1];
     o->d_trigger_m[0] = (double)firmware->snapshot.d_ceil_m;
+    o->d_true_trigger_m[0] = raw->world_ceiling_height_m + raw->world_sensed_gap_offset_m - before->p_WB_m[2];
+    o->d_sigma_trigger_m[0] = (double)firmware->snapshot.d_sigma_m;
     o->rrev_trigger[0] = (double)firmware->snapshot.rrev_per_s;
     o->of_y_trigger[0] = (double)firmware->snapshot.of_y_radps;
 }
@@ -97,6 +102,10 @@ static void note_end(const ivl_sim_world_t *world, ivl_sim_end_t end, ivl_sim_ou
     o->d_min_m[0] = world->d_min_m;
     o->n_steps[0] = world->n_step;
     o->n_ticks[0] = world->n_tick;
+    if (world->n_approach_tick > 0)
+    {
+        o->d_valid_norm[0] = (double)world->n_valid_tick / (double)world->n_approach_tick;
+    }
     if (world->impact.happened)
     {
         const ivl_sim_kin_t *kin = &world->impact.kin;
@@ -182,6 +191,7 @@ static void write_row(const ivl_sim_world_t *w, const ivl_sim_kin_t *kin, ivl_si
     row->body_contact[0] = w->plate_touched[IVL_SIM_PROP_PLATE] ? 1 : 0;
     row->d_ceil_m[0] = model->raw.world_ceiling_height_m - kin->p_WB_m[2];
     row->d_sensed_m[0] = (double)w->out.ceiling.d_ceil_m;
+    row->d_sigma_m[0] = (double)w->out.ceiling.d_sigma_m;
     row->rrev_per_s[0] = (double)w->out.cues.rrev_per_s;
     row->of_y_radps[0] = (double)w->out.cues.of_y_radps;
     row->energy_J[0] = ivl_sim_energy(model, kin);
@@ -210,7 +220,7 @@ void ivl_sim_rollout_note(const ivl_sim_group_t *group, int lane, ivl_sim_outcom
     if (world->firmware.triggered && !o->triggered[0])
     {
         const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
-        note_trigger(&kin, world->t_s, &world->firmware, o);
+        note_trigger(&kin, world, o);
     }
 }
 

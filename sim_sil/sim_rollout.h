@@ -55,6 +55,9 @@ typedef enum
     X(double, vz_impact_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "velocity along z at the first contact") \
     X(double, rate_impact_radps, 1, "f8", "rad/s", -200, 200, IVL_SIM_REQUIRED, "nose-up rate at the first contact") \
     X(double, d_trigger_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "sensed distance latched at the trigger") \
+    X(double, d_true_trigger_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "true distance from the plane of the cues at the trigger") \
+    X(double, d_sigma_trigger_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "standard deviation that the flight core gave the sensed distance at the trigger") \
+    X(double, d_valid_norm, 1, "f8", "1", 0, 1, IVL_SIM_REQUIRED, "share of the approach's ticks with a valid distance, up to the trigger") \
     X(double, rrev_trigger, 1, "f8", "1/s", 0, 1000, IVL_SIM_REQUIRED, "RREV latched at the trigger") \
     X(double, of_y_trigger, 1, "f8", "rad/s", -1000, 1000, IVL_SIM_REQUIRED, "OF_y latched at the trigger") \
     X(double, d_min_m, 1, "f8", "m", -1, 20, IVL_SIM_REQUIRED, "smallest distance of the body origin from the ceiling's surface") \
@@ -76,6 +79,7 @@ typedef enum
     X(int32_t, body_contact, 1, "i4", "1", 0, 1, 0, "1 once the propeller plate has touched") \
     X(double, d_ceil_m, 1, "f8", "m", -1, 20, IVL_SIM_REQUIRED, "true distance of the body origin from the surface") \
     X(double, d_sensed_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "distance as the flight core sees it; 0 when it has none") \
+    X(double, d_sigma_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "its standard deviation, as the flight core gives it") \
     X(double, rrev_per_s, 1, "f8", "1/s", -1000, 1000, IVL_SIM_REQUIRED, "RREV as the flight core sees it") \
     X(double, of_y_radps, 1, "f8", "rad/s", -1000, 1000, IVL_SIM_REQUIRED, "OF_y as the flight core sees it") \
     X(double, energy_J, 1, "f8", "J", -100, 100, IVL_SIM_REQUIRED, "kinetic, gravitational and elastic energy")

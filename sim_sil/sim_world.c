@@ -577,6 +577,9 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
         ivl_sim_sensors_read(model, &w->rng, &kin, a, w->t_s, &w->sensors, &w->in);
         model->core.step(group->port, lane, &model->firmware, &w->firmware, &w->in, &w->out);
         ivl_sim_rotor_command(model, &w->rotor, w->out.thrust_N);
+        const bool approaches = w->firmware.phase == IVL_PHASE_APPROACH;
+        w->n_approach_tick += approaches ? 1 : 0;
+        w->n_valid_tick += (approaches && w->out.ceiling.valid) ? 1 : 0;
     }
 }
 

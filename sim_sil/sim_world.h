@@ -39,11 +39,12 @@ typedef struct
     const ivl_sim_model_t *model;
     ivl_sim_rng_t          rng;
     double                 t_s;
-    double                 left_s;   ///< of the present tick
-    uint32_t               n_tick;   ///< ticks of the flight core since the start
-    uint32_t               n_step;   ///< integration steps since the start
-    double                 step_s;   ///< next integration step, graded after events
-    bool                   restart;  ///< the forces have jumped since the last evaluation
+    double                 left_s;                         ///< of the present tick
+    uint32_t               n_tick;                         ///< ticks of the flight core since the start
+    uint32_t               n_step;                         ///< integration steps since the start
+    uint32_t               n_approach_tick, n_valid_tick;  ///< ticks of the approach, and those with a valid distance
+    double                 step_s;                         ///< next integration step, graded after events
+    bool                   restart;                        ///< the forces have jumped since the last evaluation
     ivl_sim_foot_t         foot[IVL_SIM_LEGS];
     ivl_sim_trial_t        trial;
     ivl_sim_rotor_t        rotor;

@@ -39,6 +39,6 @@ void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state);
 /// @return IVL_OK; or, with nothing changed, IVL_ERR_RANGE or IVL_ERR_PHASE
 ivl_status_t ivl_reconfigure(ivl_cfg_t *cfg, ivl_state_t *state, const ivl_cfg_t *wanted);
 
-/// One tick: sensed state -> ceiling -> cues -> phase (with the trigger) -> maneuver or controller -> mixer -> PWM.
+/// One tick: sensed state -> distance -> cues -> phase (with the trigger) -> maneuver or controller -> mixer -> PWM.
 void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out);
 #endif  // IVL_H

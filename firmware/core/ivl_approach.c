@@ -3,7 +3,8 @@
 
 #include "ivl_math.h"
 
-void ivl_approach_begin(ivl_approach_t *approach, ivl_vec3_t p_WB_m, ivl_vec3_t v_WB_mps, float speed_mps, float angle_rad)
+void ivl_approach_begin(const ivl_cfg_t *cfg, ivl_approach_t *approach, ivl_vec3_t p_WB_m, ivl_vec3_t v_WB_mps, float speed_mps,
+                        float angle_rad)
 {
     const ivl_sincos_t dir = ivl_sincos(angle_rad);
     *approach = (ivl_approach_t){
@@ -11,17 +12,37 @@ void ivl_approach_begin(ivl_approach_t *approach, ivl_vec3_t p_WB_m, ivl_vec3_t 
         .dir_x = dir.cos,
         .dir_z = dir.sin,
         .speed_mps = v_WB_mps.x * dir.cos + v_WB_mps.z * dir.sin,
-        .target_mps = speed_mps,
+        .target_mps = (cfg->shape == (uint8_t)IVL_SHAPE_ACCELERATE) ? cfg->speed_mps_max : speed_mps,
+        .last_mps = cfg->shape_speed_norm * speed_mps,
     };
 }
 
-ivl_reference_t ivl_approach_next(const ivl_cfg_t *cfg, ivl_approach_t *approach, float dt_s)
+// RREV stays as it is while the speed falls with the distance: v' = -RREV v                                     [MODEL eq. 9.16]
+static float braking_mps(const ivl_cfg_t *cfg, ivl_approach_t *approach, float rrev_per_s, float dt_s)
+{
+    approach->closing = approach->closing || (rrev_per_s >= cfg->shape_rrev_per_s);
+    if (!approach->closing || !(approach->speed_mps > approach->last_mps))
+    {
+        return 0.0f;
+    }
+    approach->target_mps = approach->last_mps;
+    const float left_mps = approach->speed_mps - approach->last_mps;
+    const float asked_mps = cfg->shape_rrev_per_s * approach->speed_mps * dt_s;
+    return (asked_mps < left_mps) ? asked_mps : left_mps;
+}
+
+ivl_reference_t ivl_approach_next(const ivl_cfg_t *cfg, ivl_approach_t *approach, float rrev_per_s, float dt_s)
 {
     const ivl_vec3_t dir = {approach->dir_x, 0.0f, approach->dir_z};
 
     // speed change of the coming tick, limited by the acceleration; zero once the target is reached
     const float dv_mps_max = cfg->approach_accel_mps2 * dt_s;
-    const float dv_mps = ivl_clamp(approach->target_mps - approach->speed_mps, -dv_mps_max, dv_mps_max);
+    float       dv_mps = ivl_clamp(approach->target_mps - approach->speed_mps, -dv_mps_max, dv_mps_max);
+    if (cfg->shape == (uint8_t)IVL_SHAPE_RREV)
+    {
+        const float brake_mps = braking_mps(cfg, approach, rrev_per_s, dt_s);
+        dv_mps = (brake_mps > 0.0f) ? -brake_mps : dv_mps;
+    }
 
     const ivl_reference_t ref = {
         .p_W_m = approach->p_W_m,

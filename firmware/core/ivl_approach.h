@@ -1,5 +1,5 @@
 /// @file ivl_approach.h
-/// Stage 5b: the approach generator.  A straight path in the x-z plane of W, its speed ramped with constant acceleration and then held.
+/// Stage 5b: the approach generator.  A straight path in the x-z plane of W, its speed ramped with constant acceleration, and then as cfg->shape says.
 #ifndef IVL_APPROACH_H
 #define IVL_APPROACH_H
 #include "ivl_cfg.h"
@@ -12,19 +12,31 @@ typedef struct
     ivl_vec3_t a_W_mps2;
 } ivl_reference_t;
 
+/// How the speed along the path goes on once it has reached the commanded one (cfg->shape).
+typedef enum
+{
+    IVL_SHAPE_HOLD,        ///< it is held
+    IVL_SHAPE_ACCELERATE,  ///< it keeps growing, up to speed_max
+    IVL_SHAPE_RREV  ///< it is held until RREV reaches shape_rrev, then RREV is held until shape_speed of it is left, then that is held
+} ivl_shape_t;
+
 typedef struct
 {
     ivl_vec3_t p_W_m;  ///< present point of the path
     float      dir_x;  ///< direction of the path in W, unit length
     float      dir_z;
     float      speed_mps;   ///< present speed along the path
-    float      target_mps;  ///< speed to be held
+    float      target_mps;  ///< speed to be reached
+    float      last_mps;    ///< shape RREV: speed at which holding RREV ends
+    bool       closing;     ///< shape RREV: RREV is being held
 } ivl_approach_t;
 
 /// Start a path at the present position with the present velocity component along it; a vehicle already at speed just holds it.
 /// @param[in] angle_rad  above horizontal, 0..pi/2
-void ivl_approach_begin(ivl_approach_t *approach, ivl_vec3_t p_WB_m, ivl_vec3_t v_WB_mps, float speed_mps, float angle_rad);
+void ivl_approach_begin(const ivl_cfg_t *cfg, ivl_approach_t *approach, ivl_vec3_t p_WB_m, ivl_vec3_t v_WB_mps, float speed_mps,
+                        float angle_rad);
 
 /// Reference of this tick; then advance by one tick of dt_s.
-ivl_reference_t ivl_approach_next(const ivl_cfg_t *cfg, ivl_approach_t *approach, float dt_s);
+/// @param[in] rrev_per_s  present cue, 0 if there is none
+ivl_reference_t ivl_approach_next(const ivl_cfg_t *cfg, ivl_approach_t *approach, float rrev_per_s, float dt_s);
 #endif  // IVL_APPROACH_H

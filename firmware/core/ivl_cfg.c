@@ -7,7 +7,7 @@
 #include "ivl_wire.h"
 
 #define ROW(ctype, group, name, field, unit, min, max, dflt, doc)  ROW_##field,
-#define NAME(ctype, group, name, field, unit, min, max, dflt, doc) name,
+#define NAME(ctype, group, name, field, unit, min, max, dflt, doc) name "\0"
 #define ENTRY(ctype, group, name, field, unit, min, max, dflt, doc)                                                                        \
     {offsetof(ivl_cfg_t, field), sizeof(ctype), (float)(min), (float)(max), (float)(dflt)},
 
@@ -16,7 +16,8 @@ enum
     IVL_PARAMS(ROW) ROW_COUNT
 };
 
-static const char *const NAMES[] = {IVL_PARAMS(NAME)};
+// one behind the other
+static const char NAMES[] = IVL_PARAMS(NAME);
 
 // a member of one byte is a uint8_t, one of four a float
 typedef struct
@@ -117,7 +118,18 @@ int ivl_cfg_bad_row(const ivl_cfg_t *cfg)
 
 const char *ivl_cfg_name(int row)
 {
-    return ((row >= 0) && (row < (int)ROW_COUNT)) ? NAMES[row] : NULL;
+    if ((row < 0) || (row >= (int)ROW_COUNT))
+    {
+        return NULL;
+    }
+    const char *name = NAMES;
+    for (; row > 0; row--)
+    {
+        while (*name++ != '\0')
+        {
+        }
+    }
+    return name;
 }
 
 const char *ivl_cfg_bad_name(const ivl_cfg_t *cfg)

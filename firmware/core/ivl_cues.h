@@ -11,7 +11,17 @@ typedef struct
     bool  valid;       ///< false: the fields above must not be used
 } ivl_cues_t;
 
+/// What is seen of the ceiling in a tick.
+typedef struct
+{
+    ivl_ceiling_t ceiling;
+    ivl_cues_t    cues;
+} ivl_seen_t;
+
 /// Cues from the ceiling and the velocity of B in W.
 /// @return .valid is false if the ceiling is invalid or its distance not positive
 ivl_cues_t ivl_cues_compute(ivl_ceiling_t ceiling, ivl_vec3_t v_WB_mps);
+
+/// Put the flow sensor's reading in the place of OF_y, if cfg->of_source asks for it and the reading is valid and not older than d_old_s_max.
+void ivl_cues_take_flow(const ivl_cfg_t *cfg, const ivl_in_t *in, ivl_cues_t *cues);
 #endif  // IVL_CUES_H

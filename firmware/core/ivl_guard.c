@@ -6,15 +6,9 @@
 
 // ---- conditions: pure questions about this tick.  Written in positive form and negated, so that a NaN counts as the bad case.
 
-typedef struct
-{
-    ivl_ceiling_t ceiling;
-    ivl_cues_t    cues;
-} seen_t;
+typedef bool (*condition_t)(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen);
 
-typedef bool (*condition_t)(const ivl_cfg_t *cfg, const ivl_state_t *state, const seen_t *seen);
-
-#define CONDITION(name) static bool name(const ivl_cfg_t *cfg, const ivl_state_t *state, const seen_t *seen)
+#define CONDITION(name) static bool name(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 #define UNUSED(x)       ((void)(x))
 
 static bool elapsed(const ivl_state_t *state, float limit_s)
@@ -261,13 +255,20 @@ static const row_t ROWS[] = {
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_RULE_COUNT, "one row a rule");
 _Static_assert(IVL_RULE_COUNT <= 255, "a rule is logged in one byte");
 
-ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues)
+// first row of the table that names a phase: those before it need no look
+static const uint8_t FIRST[] = {
+    [IVL_PHASE_IDLE] = IVL_RULE_CONFIG,  [IVL_PHASE_READY] = IVL_RULE_STATE,   [IVL_PHASE_APPROACH] = IVL_RULE_STATE,
+    [IVL_PHASE_FLIP] = IVL_RULE_CONTACT, [IVL_PHASE_COAST] = IVL_RULE_CONTACT, [IVL_PHASE_ATTACHED] = IVL_RULE_COUNT,
+    [IVL_PHASE_DONE] = IVL_RULE_COUNT,   [IVL_PHASE_ABORTED] = IVL_RULE_LOST,
+};
+_Static_assert(sizeof FIRST / sizeof FIRST[0] == (size_t)IVL_PHASE_COUNT, "one entry a phase");
+
+ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 {
-    const seen_t   seen = {ceiling, cues};
     const uint32_t phase = 1u << state->phase;
-    for (int i = 0; i < (int)IVL_RULE_COUNT; i++)
+    for (int i = (int)FIRST[state->phase]; i < (int)IVL_RULE_COUNT; i++)
     {
-        if (((ROWS[i].phases & phase) != 0u) && ROWS[i].when(cfg, state, &seen))
+        if (((ROWS[i].phases & phase) != 0u) && ROWS[i].when(cfg, state, seen))
         {
             return (ivl_rule_t)i;
         }

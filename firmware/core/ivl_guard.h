@@ -17,7 +17,7 @@ typedef enum
 } ivl_act_t;
 
 /// First rule of the table that holds in the present phase, IVL_RULE_NONE if none does.  O(rules), no side effect.
-ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues);
+ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen);
 
 /// What follows from a rule; IVL_ACT_NONE for IVL_RULE_NONE and for a number that is none.
 ivl_act_t ivl_guard_act(ivl_rule_t rule);

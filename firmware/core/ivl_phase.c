@@ -8,9 +8,9 @@
 
 // ---- conditions: pure questions about the state of this tick
 
-typedef bool (*condition_t)(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_cues_t cues);
+typedef bool (*condition_t)(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen);
 
-#define CONDITION(name) static bool name(const ivl_cfg_t *cfg, const ivl_state_t *state, ivl_cues_t cues)
+#define CONDITION(name) static bool name(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 #define UNUSED(x)       ((void)(x))
 
 static bool requested(const ivl_state_t *state, ivl_request_t request)
@@ -36,32 +36,32 @@ static bool rule_says(const ivl_state_t *state, ivl_act_t act)
 
 CONDITION(request_idle)
 {
-    UNUSED(cfg), UNUSED(cues);
+    UNUSED(cfg), UNUSED(seen);
     return requested(state, IVL_REQUEST_IDLE);
 }
 
 CONDITION(request_abort)
 {
-    UNUSED(cfg), UNUSED(cues);
+    UNUSED(cfg), UNUSED(seen);
     return requested(state, IVL_REQUEST_ABORT);
 }
 
 CONDITION(request_hover)
 {
-    UNUSED(cfg), UNUSED(cues);
+    UNUSED(cfg), UNUSED(seen);
     return requested(state, IVL_REQUEST_HOVER);
 }
 
 CONDITION(may_arm)
 {
-    UNUSED(cfg), UNUSED(cues);
+    UNUSED(cfg), UNUSED(seen);
     const bool wanted = requested(state, IVL_REQUEST_HOVER) || requested(state, IVL_REQUEST_APPROACH);
     return wanted && state->derived.cfg_good && fresh(state) && rule_says(state, IVL_ACT_NONE);
 }
 
 CONDITION(may_approach)
 {
-    UNUSED(cues);
+    UNUSED(seen);
     return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && fresh(state) && elapsed(state, cfg->ready_s_min);
 }
 
@@ -69,19 +69,19 @@ CONDITION(may_approach)
 
 CONDITION(must_abort)
 {
-    UNUSED(cfg), UNUSED(cues);
+    UNUSED(cfg), UNUSED(seen);
     return rule_says(state, IVL_ACT_ABORT);
 }
 
 CONDITION(must_attach)
 {
-    UNUSED(cfg), UNUSED(cues);
+    UNUSED(cfg), UNUSED(seen);
     return rule_says(state, IVL_ACT_ATTACH);
 }
 
 CONDITION(must_cut)
 {
-    UNUSED(cfg), UNUSED(cues);
+    UNUSED(cfg), UNUSED(seen);
     return rule_says(state, IVL_ACT_CUT);
 }
 
@@ -90,18 +90,18 @@ CONDITION(must_cut)
 CONDITION(triggered)
 {
     UNUSED(cfg);
-    return !rule_says(state, IVL_ACT_HOLD) && ivl_trigger_due(&state->policy, cues);
+    return !rule_says(state, IVL_ACT_HOLD) && ivl_trigger_due(&state->policy, seen->cues);
 }
 
 CONDITION(inverted)
 {
-    UNUSED(cues);
+    UNUSED(seen);
     return (cfg->cut_at_inverted != 0u) && !(state->sense.up_z > 0.0f);
 }
 
 CONDITION(attached_over)
 {
-    UNUSED(cues);
+    UNUSED(seen);
     return elapsed(state, cfg->attached_s);
 }
 
@@ -171,7 +171,7 @@ static void enter_ready(ivl_state_t *state)
     memset(&state->snapshot, 0, sizeof state->snapshot);
 }
 
-static void enter(ivl_state_t *state, ivl_phase_t next, ivl_ceiling_t ceiling, ivl_cues_t cues)
+static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, const ivl_seen_t *seen)
 {
     const ivl_sample_t *sample = &state->sense.sample;
     state->phase = next;
@@ -183,12 +183,12 @@ static void enter(ivl_state_t *state, ivl_phase_t next, ivl_ceiling_t ceiling, i
         state->p_hold_W_m = sample->p_WB_m;
         break;
     case IVL_PHASE_APPROACH:
-        ivl_approach_begin(&state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
+        ivl_approach_begin(cfg, &state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
         break;
     case IVL_PHASE_FLIP:
         state->triggered = true;
         state->diag.n_trigger++;
-        ivl_trigger_latch(&state->snapshot, sample, ceiling, cues, &state->policy);
+        ivl_trigger_latch(&state->snapshot, sample, seen, &state->policy);
         break;
     case IVL_PHASE_ABORTED:
         state->p_hold_W_m = sample->p_WB_m;
@@ -214,28 +214,28 @@ static void note_cause(ivl_state_t *state)
     }
 }
 
-static bool take_exit(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues)
+static bool take_exit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
 {
-    state->guard.rule = (uint8_t)ivl_guard_find(cfg, state, ceiling, cues);
+    state->guard.rule = (uint8_t)ivl_guard_find(cfg, state, seen);
     for (const exit_t *e = ROWS[state->phase].exits; e->when != NULL; e++)
     {
-        if (e->when(cfg, state, cues))
+        if (e->when(cfg, state, seen))
         {
             if (state->phase != IVL_PHASE_IDLE)
             {
                 note_cause(state);
             }
-            enter(state, e->next, ceiling, cues);
+            enter(cfg, state, e->next, seen);
             return true;
         }
     }
     return false;
 }
 
-void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues)
+void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
 {
     // the bound is never reached: no set of conditions leads round a circle within one tick
-    for (int i = 0; (i < (int)IVL_PHASE_COUNT) && take_exit(cfg, state, ceiling, cues); i++)
+    for (int i = 0; (i < (int)IVL_PHASE_COUNT) && take_exit(cfg, state, seen); i++)
     {
     }
     state->n_phase_tick++;

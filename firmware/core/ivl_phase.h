@@ -15,7 +15,7 @@ typedef enum
 } ivl_drive_t;
 
 /// Follow the exits of the table until the phase is stable (each phase at most once per tick), with the entry action of each phase.
-void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues);
+void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen);
 
 /// What drives the motors in the present phase: the row's entry, but OFF in ABORTED once the vehicle was lost or has landed.
 ivl_drive_t ivl_phase_drive(const ivl_state_t *state);

@@ -23,6 +23,9 @@ typedef struct
     ivl_vec3_t    f_B_mps2;  ///< specific force (accelerometer)
     ivl_command_t cmd;
     ivl_vitals_t  vitals;
+    ivl_reading_t rrev;   ///< 1/s, positive while the ceiling comes closer: a camera's
+    ivl_reading_t range;  ///< m, along b_z: a ranging sensor's that faces up
+    ivl_reading_t flow;   ///< rad/s, as OF_y: a flow sensor's that faces up
 } ivl_in_t;
 
 typedef struct

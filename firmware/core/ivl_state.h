@@ -4,6 +4,7 @@
 #define IVL_STATE_H
 #include "ivl_contact.h"
 #include "ivl_controller.h"
+#include "ivl_distance.h"
 #include "ivl_trigger.h"
 
 /// Counters of events; they never decrease (they wrap after 2^32).
@@ -51,6 +52,7 @@ typedef struct
     float          landed_s;    ///< ABORTED: how long the reference has been at land_height
     ivl_guard_t    guard;
     ivl_contact_t  contact;
+    ivl_distance_t distance;
     ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
     ivl_diag_t     diag;
 } ivl_state_t;

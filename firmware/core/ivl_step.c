@@ -47,14 +47,14 @@ static void count_faults(ivl_diag_t *diag, const ivl_sense_t *sense)
 }
 
 // all motors off
-static void rest(const ivl_state_t *state, ivl_ceiling_t ceiling, ivl_cues_t cues, ivl_out_t *out)
+static void rest(const ivl_state_t *state, const ivl_seen_t *seen, ivl_out_t *out)
 {
     *out = (ivl_out_t){
         .phase = state->phase,
         .phase_log = (uint8_t)state->phase,
         .stock_allowed = (state->phase == IVL_PHASE_IDLE) && !state->guard.locked_out,
-        .ceiling = ceiling,
-        .cues = cues,
+        .ceiling = seen->ceiling,
+        .cues = seen->cues,
     };
 }
 
@@ -64,7 +64,7 @@ static void track(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_refe
     ivl_mixer_thrusts(cfg, &wrench, thrust_N);
 }
 
-static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, float thrust_N[4])
+static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, float rrev_per_s, float thrust_N[4])
 {
     ivl_reference_t ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
     switch (what)
@@ -78,7 +78,7 @@ static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, fl
         track(cfg, state, &ref, thrust_N);
         break;
     case IVL_DRIVE_APPROACH:
-        ref = ivl_approach_next(cfg, &state->approach, state->derived.dt_s);
+        ref = ivl_approach_next(cfg, &state->approach, rrev_per_s, state->derived.dt_s);
         track(cfg, state, &ref, thrust_N);
         break;
     case IVL_DRIVE_FLIP:
@@ -94,35 +94,37 @@ static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, fl
 void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
 {
     state->diag.n_tick++;
-    ivl_ceiling_t ceiling = {0};
-    ivl_cues_t    cues = {0};
+    ivl_seen_t seen = {.cues = {.valid = false}};
 
     // a finished landing only waits for the end of its request cycle
     if ((state->phase == IVL_PHASE_DONE) && (in->cmd.request != IVL_REQUEST_IDLE))
     {
-        rest(state, ceiling, cues, out);
+        rest(state, &seen, out);
         return;
     }
 
     state->guard.vitals = in->vitals;
-    // sensed state -> contact, ceiling -> cues -> phase (the trigger is one of its conditions)
+    // sensed state -> contact, distance -> cues -> phase (the trigger is one of its conditions)
     ivl_sense_update(cfg, &state->sense, in, state->derived.dt_s);
     count_faults(&state->diag, &state->sense);
     ivl_contact_update(cfg, &state->contact, &state->sense, state->derived.dt_s);
     if (!ivl_motors_latched_off(state))
     {
-        ceiling = ivl_ceiling_compute(cfg, &state->sense);
-        cues = ivl_cues_compute(ceiling, state->sense.sample.v_WB_mps);
+        // an approach that ends with this tick's request needs no estimate any more
+        const bool is_approach = (state->phase == IVL_PHASE_APPROACH) && (state->sense.cmd.request == IVL_REQUEST_APPROACH);
+        seen.ceiling = ivl_distance_update(cfg, &state->distance, &state->sense, in, is_approach, state->derived.dt_s);
+        seen.cues = ivl_cues_compute(seen.ceiling, state->sense.sample.v_WB_mps);
+        ivl_cues_take_flow(cfg, in, &seen.cues);
     }
-    ivl_phase_update(cfg, state, ceiling, cues);
+    ivl_phase_update(cfg, state, &seen);
 
     // phase -> thrusts -> PWM
-    rest(state, ceiling, cues, out);
+    rest(state, &seen, out);
     const ivl_drive_t what = ivl_phase_drive(state);
     if (what != IVL_DRIVE_OFF)
     {
         out->motors_on = true;
-        drive(cfg, state, what, out->thrust_N);
+        drive(cfg, state, what, seen.cues.rrev_per_s, out->thrust_N);
         ivl_pwm_of_thrust(cfg, out->thrust_N, out->pwm);
         const ivl_wrench_t made = ivl_mixer_wrench(cfg, out->thrust_N);
         out->moment_y_Nm = made.moment_B_Nm.y;

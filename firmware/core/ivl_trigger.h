@@ -15,6 +15,7 @@ typedef struct
     ivl_vec3_t   w_B_radps;
     ivl_vec3_t   f_B_mps2;
     float        d_ceil_m;
+    float        d_sigma_m;
     float        rrev_per_s;
     float        of_y_radps;
     ivl_policy_t policy;
@@ -24,6 +25,5 @@ typedef struct
 bool ivl_trigger_due(const ivl_policy_t *policy, ivl_cues_t cues);
 
 /// Latch the trigger tick.
-void ivl_trigger_latch(ivl_snapshot_t *snapshot, const ivl_sample_t *sample, ivl_ceiling_t ceiling, ivl_cues_t cues,
-                       const ivl_policy_t *policy);
+void ivl_trigger_latch(ivl_snapshot_t *snapshot, const ivl_sample_t *sample, const ivl_seen_t *seen, const ivl_policy_t *policy);
 #endif  // IVL_TRIGGER_H

@@ -117,6 +117,14 @@ typedef struct
     float   p_sigma_m;       ///< standard deviation of the position estimate, largest axis
 } ivl_vitals_t;
 
+/// What a sensor beside the state estimate said last; repeated until it says something else.  All zero where there is no such sensor.
+typedef struct
+{
+    uint64_t t_us;   ///< when it arrived at the port; what differs from the last one is new
+    float    value;  ///< in the sensor's unit
+    uint8_t  valid;  ///< 0: the sensor has found nothing (out of range, saturated)
+} ivl_reading_t;
+
 /// One sensed state of the vehicle.
 typedef struct
 {

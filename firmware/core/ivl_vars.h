@@ -28,6 +28,31 @@
     /* ceiling and cues */                                                                                                                   \
     X(float, "ivl", "d_ceil_min", d_ceil_m_min, "m", 0.001, 1.0, 0.01, "smallest distance that gives a valid cue")                           \
     X(float, "ivl", "d_ceil_max", d_ceil_m_max, "m", 0.1, 100.0, 5.0, "largest distance that gives a valid cue")                             \
+    /* sources of the distance: see ivl_distance.h */                                                                                        \
+    X(uint8_t, "ivl", "d_source", d_source, "1", 0, 3, 0, "0 known height, 1 formula, 2 filter, 3 ranging sensor")                           \
+    X(uint8_t, "ivl", "d_predict", d_predict, "1", 0, 1, 0, "known height: 1 carries the sample on to the present tick")                     \
+    X(float, "ivl", "height_sigma", height_sigma_m, "m", 0.0, 1.0, 0.002, "known height: standard deviation of the distance")                \
+    X(uint8_t, "ivl", "of_source", of_source, "1", 0, 1, 0, "OF_y from 0 velocity and distance, 1 the flow sensor")                          \
+    X(float, "ivl", "d_sigma_max", d_sigma_norm_max, "1", 0.01, 10.0, 0.25, "a distance less certain than this part of itself is invalid")   \
+    X(float, "ivl", "d_old_max", d_old_s_max, "s", 0.01, 1.0, 0.25, "a distance without a measurement for longer is invalid")                \
+    X(float, "ivl", "rrev_delay", rrev_delay_s, "s", 0.0, 0.06, 0.0, "from the sampling instant of a measured RREV to its arrival")          \
+    X(float, "ivl", "range_delay", range_delay_s, "s", 0.0, 0.06, 0.0, "the same of a range")                                                \
+    X(float, "ivl", "accel_delay", accel_delay_s, "s", 0.0, 0.02, 0.0, "delay of the accelerometer's low-pass")                              \
+    X(float, "ivl", "rrev_max", rrev_per_s_max, "1/s", 0.1, 100.0, 20.0, "a measured RREV beyond this is ignored")                           \
+    X(float, "ivl", "rrev_sigma", rrev_sigma_per_s, "1/s", 0.001, 10.0, 0.05, "standard deviation of a measured RREV: constant part")        \
+    X(float, "ivl", "rrev_sigma_norm", rrev_sigma_norm, "1", 0.0, 1.0, 0.05, "and part that grows with it")                                  \
+    X(float, "ivl", "range_min", range_m_min, "m", 0.0, 1.0, 0.04, "a range below this is ignored [VL53L1x]")                                \
+    X(float, "ivl", "range_max", range_m_max, "m", 0.1, 40.0, 4.0, "a range beyond this is ignored [VL53L1x]")                               \
+    X(float, "ivl", "range_sigma", range_sigma_m, "m", 0.001, 1.0, 0.015, "range: what changes from one to the next, sigma [VL53L1x]")       \
+    X(float, "ivl", "range_bias", range_bias_m, "m", 0.0, 1.0, 0.015, "range: what stays, and no filter averages out, sigma [VL53L1x]")      \
+    X(float, "ivl", "rrev_tau", rrev_tau_s, "s", 0.0, 1.0, 0.04, "formula: lag of RREV, its derivative and the acceleration")                \
+    X(float, "ivl", "accel_min", accel_mps2_min, "m/s^2", 0.0, 20.0, 0.5, "formula: invalid below this acceleration")                        \
+    X(float, "ivl", "denom_min", denom_per_s2_min, "1/s^2", 0.001, 100.0, 0.5, "formula: invalid below this denominator")                    \
+    X(float, "ivl", "kf_d_sigma", kf_d_sigma_m, "m", 0.001, 10.0, 0.5, "filter: standard deviation of the distance at the start")            \
+    X(float, "ivl", "kf_v_sigma", kf_v_sigma_mps, "m/s", 0.001, 10.0, 0.05, "filter: of the closing speed at the start")                     \
+    X(float, "ivl", "kf_b_sigma", kf_b_sigma_mps2, "m/s^2", 0.001, 10.0, 0.15, "filter: of the accelerometer's bias")                        \
+    X(float, "ivl", "kf_q", kf_q_m2ps3, "m^2/s^3", 1.0e-6, 1.0, 5.0e-4, "filter: growth of the speed's variance in a second")                \
+    X(float, "ivl", "kf_gate", kf_gate_norm, "1", 1.0, 100.0, 4.0, "filter: measurements further off than this many sigma are refused")      \
     X(float, "ivl", "rrev_c_max", rrev_c_per_s_max, "1/s", 0.0, 20.0, 20.0, "largest trigger threshold that a policy may ask for")           \
     X(float, "ivl", "moment_y_max", moment_y_Nm_max, "N m", 0.0, 0.02, 0.02, "largest moment that a policy may ask for")                     \
     /* tracking controller [S] */                                                                                                            \
@@ -43,6 +68,9 @@
     X(float, "ivl", "tilt_abort", tilt_abort_rad, "rad", 0.2, 1.5, 1.3, "ready and approach abort beyond this sensed tilt")                  \
     /* approach [P] */                                                                                                                       \
     X(float, "ivl", "approach_accel", approach_accel_mps2, "m/s^2", 0.1, 20.0, 4.3, "acceleration along the approach path")                  \
+    X(uint8_t, "ivl", "shape", shape, "1", 0, 2, 0, "approach: 0 accelerate and hold, 1 accelerate, 2 hold RREV for a while")                \
+    X(float, "ivl", "shape_rrev", shape_rrev_per_s, "1/s", 0.1, 20.0, 3.0, "shape 2: RREV that is held")                                     \
+    X(float, "ivl", "shape_speed", shape_speed_norm, "1", 0.05, 1.0, 0.6, "shape 2: part of the speed at which holding RREV ends")           \
     X(float, "ivl", "speed_min", speed_mps_min, "m/s", 0.01, 10.0, 0.1, "smallest approach speed that is accepted")                          \
     X(float, "ivl", "speed_max", speed_mps_max, "m/s", 0.1, 10.0, 6.0, "largest approach speed that is accepted")                            \
     /* phases */                                                                                                                             \
@@ -105,13 +133,19 @@
     X(float, "ivl", "moment_y", ivl_out_t, moment_y_Nm, "N m", "moment about b_y of the thrust commands")                \
     X(float, "ivl", "d_ceil", ivl_out_t, ceiling.d_ceil_m, "m", "distance to the ceiling, 0 if invalid")                 \
     X(float, "ivl", "d_age", ivl_out_t, ceiling.age_s, "s", "age of the distance")                                       \
+    X(float, "ivl", "d_sigma", ivl_out_t, ceiling.d_sigma_m, "m", "standard deviation of the distance, 0 if invalid")    \
+    X(float, "ivl", "v_close", ivl_out_t, ceiling.v_close_mps, "m/s", "closing speed, 0 if invalid")                     \
     X(float, "ivl", "rrev", ivl_out_t, cues.rrev_per_s, "1/s", "RREV, 0 if invalid")                                     \
     X(float, "ivl", "of_y", ivl_out_t, cues.of_y_radps, "rad/s", "ventral flow about body y, 0 if invalid")              \
     X(float, "ivl", "age", ivl_state_t, sense.age_s, "s", "age of the sample in use")                                    \
+    X(float, "ivl", "kf_bias", ivl_state_t, distance.filter.b_mps2, "m/s^2", "filter: bias of the accelerometer")        \
+    X(uint32_t, "ivl", "n_measured", ivl_state_t, distance.n_taken, "1", "measurements of this approach that were taken")\
+    X(uint32_t, "ivl", "n_gated", ivl_state_t, distance.n_gated, "1", "measurements of this approach that were refused as too far off")\
     X(uint32_t, "ivl", "policy_seq", ivl_state_t, policy.seq, "1", "number of the policy in use")                        \
     X(float, "ivl", "rrev_c", ivl_state_t, policy.rrev_c_per_s, "1/s", "trigger threshold in use")                       \
     X(float, "ivl", "moment_c", ivl_state_t, policy.moment_y_Nm, "N m", "moment in use")                                 \
     X(float, "ivl", "trg_d", ivl_state_t, snapshot.d_ceil_m, "m", "distance at the trigger")                             \
+    X(float, "ivl", "trg_d_sigma", ivl_state_t, snapshot.d_sigma_m, "m", "standard deviation of the distance at the trigger")\
     X(float, "ivl", "trg_rrev", ivl_state_t, snapshot.rrev_per_s, "1/s", "RREV at the trigger")                          \
     X(float, "ivl", "trg_of_y", ivl_state_t, snapshot.of_y_radps, "rad/s", "ventral flow at the trigger")                \
     X(float, "ivl", "trg_vx", ivl_state_t, snapshot.v_WB_mps.x, "m/s", "velocity along W x at the trigger")              \

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ivl import model, native, yamlfile
+from ivl import model, native, sensing, yamlfile
 from ivl.errors import ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
 from ivl.reward import REWARDS, RewardOptions
@@ -110,6 +110,11 @@ class Experiment(Strict):
     speed_mps: Finite = Field(gt=0)
     angle_deg: Finite
     start: Literal["imparted", "flown"] = "imparted"
+    sensing: str | None = Field(default=None, description="sensor set that replaces the vehicle's own sensing")
+    approach: Literal["accelerate_hold", "constant_acceleration", "constant_rrev"] = "accelerate_hold"
+    estimator: Literal["known_height", "known_height_predicted", "formula", "kalman", "range"] | None = Field(
+        default=None, description="source of the distance; None: as vehicle or sensor set say"
+    )
     overrides: dict[str, Setting] = Field(default_factory=dict)
     policy: Policy
     learner: LearnerChoice
@@ -133,7 +138,8 @@ class Experiment(Strict):
     def make_world(self) -> World:
         """The world that this experiment flies in."""
         overrides = {name: setting.value for name, setting in self.overrides.items()}
-        return World(self.vehicle, self.gear, self.gear_set, **overrides)
+        chosen = {**sensing.approach_settings(self.approach), **sensing.estimator_settings(self.estimator)}
+        return World(self.vehicle, self.gear, self.gear_set, self.sensing, **{**chosen, **overrides})
 
     def make_learner(self, seed: int) -> Learner:
         """A new learner at the start of its search."""

@@ -22,6 +22,9 @@ from ivl.errors import ConfigError
 
 VEHICLES_DIR = Path(__file__).parent / "vehicles"
 GEARS_DIR = Path(__file__).parent / "gears"
+SENSORS_DIR = Path(__file__).parent / "sensors"
+SENSING_GROUPS = ("sense", "rrev", "range", "flow")
+"""Groups of parameters that a sensor set gives as a whole: what it leaves out is at its default."""
 DEFAULT_GEAR_SET = "table1"
 
 Table = Mapping[str, native.Field]
@@ -43,6 +46,10 @@ class _Header(BaseModel):
 
     name: str = Field(min_length=1)
     doc: str = Field(min_length=1)
+
+
+class _SensorHeader(_Header):
+    includes: list[str] = Field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -114,6 +121,47 @@ def load_vehicle(name_or_path: str, table: Table | None = None) -> Part:
     header = yamlfile.validate(_Header, data, path.name)
     groups = {key: value for key, value in data.items() if key not in _Header.model_fields}
     return Part(header.name, header.doc, path.name, _quantities(groups, path.name, table or native.library().params))
+
+
+def list_sensor_sets() -> list[str]:
+    """Names of the sensor sets that ship with the package."""
+    return sorted(path.stem for path in SENSORS_DIR.glob("*.yaml"))
+
+
+def load_sensors(name_or_path: str, table: Table | None = None) -> Part:
+    """Read and check a sensor set: the groups `SENSING_GROUPS`, and flight parameters that go with them.
+
+    A set may name others under `includes`: it has what they have, a later one wins over an earlier one, and its own
+    values win over all of theirs. Arguments and errors as `load_vehicle`.
+    """
+    return _load_sensors(name_or_path, table or native.library().params, ())
+
+
+def _load_sensors(name_or_path: str, table: Table, including: tuple[Path, ...]) -> Part:
+    path = _locate(name_or_path, SENSORS_DIR, "sensor set")
+    if path in including:
+        raise ConfigError(
+            f"{path.name}: includes: {' -> '.join(p.stem for p in (*including, path))} goes round in circles"
+        )
+    data = yamlfile.read(path)
+    header = yamlfile.validate(_SensorHeader, data, path.name)
+    groups = {key: value for key, value in data.items() if key not in _SensorHeader.model_fields}
+    for group in groups:
+        if group not in (*SENSING_GROUPS, "firmware"):
+            raise ConfigError(
+                f"{path.name}: {group}: not part of a sensor set (allowed {', '.join(SENSING_GROUPS)}, firmware)"
+            )
+    quantities: dict[str, Quantity] = {}
+    for name in header.includes:
+        quantities |= _load_sensors(name, table, (*including, path)).quantities
+    quantities |= _quantities(groups, path.name, table)
+    return Part(header.name, header.doc, path.name, quantities)
+
+
+def without_sensors(vehicle: Part) -> Part:
+    """The vehicle with the sensing taken out, to be replaced by a sensor set."""
+    kept = {n: q for n, q in vehicle.quantities.items() if n.partition(".")[0] not in SENSING_GROUPS}
+    return Part(vehicle.name, vehicle.doc, vehicle.label, kept)
 
 
 def load_gear(design: str, gear_set: str = DEFAULT_GEAR_SET, table: Table | None = None) -> Part:

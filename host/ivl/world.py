@@ -48,6 +48,7 @@ class World:
         vehicle: str = "habas2021",
         gear: str = "wide_short",
         gear_set: str = model.DEFAULT_GEAR_SET,
+        sensing: str | None = None,
         **overrides: float,
     ) -> None:
         """Read, check and assemble the files and build the native model.
@@ -56,15 +57,16 @@ class World:
             vehicle: Name of a shipped vehicle, or a path to a YAML file.
             gear: Name of a design in the gear set.
             gear_set: Name of a shipped gear set, or a path to a YAML file.
+            sensing: Name of a shipped sensor set, or a path to a YAML file; it replaces the vehicle's own sensing.
             **overrides: Parameter values by dotted name, in the unit of the parameter table.
 
         Raises:
             ConfigError: A file or an override is wrong.
             NativeError: The library is missing or refuses the combination of values.
         """
-        self.vehicle, self.gear, self.gear_set = vehicle, gear, gear_set
+        self.vehicle, self.gear, self.gear_set, self.sensing = vehicle, gear, gear_set, sensing
         self.overrides = dict(overrides)
-        self._build(model.assemble((model.load_vehicle(vehicle), model.load_gear(gear, gear_set)), overrides))
+        self._build(model.assemble(_parts(vehicle, gear, gear_set, sensing), overrides))
 
     def _build(self, params: model.Parameters) -> None:
         self.params = params
@@ -76,7 +78,7 @@ class World:
 
     def __getstate__(self) -> dict[str, Any]:
         """What pickling carries: the checked parameters, never the files' names alone nor the native handle."""
-        names = ("vehicle", "gear", "gear_set", "overrides", "params")
+        names = ("vehicle", "gear", "gear_set", "sensing", "overrides", "params")
         return {name: getattr(self, name) for name in names}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -87,7 +89,8 @@ class World:
     def __repr__(self) -> str:
         """The call that makes this world."""
         extra = "".join(f", {name}={value!r}" for name, value in self.overrides.items())
-        return f"World(vehicle={self.vehicle!r}, gear={self.gear!r}, gear_set={self.gear_set!r}{extra})"
+        sensing = f", sensing={self.sensing!r}" if self.sensing else ""
+        return f"World(vehicle={self.vehicle!r}, gear={self.gear!r}, gear_set={self.gear_set!r}{sensing}{extra})"
 
     @property
     def native_model(self) -> native.NativeModel:
@@ -213,6 +216,15 @@ class World:
             raise ArgumentError(
                 f"{name}: value {value!r} is out of range (allowed {field.lo:g} .. {field.hi:g} {field.unit})"
             )
+
+
+def _parts(vehicle: str, gear: str, gear_set: str, sensing: str | None) -> list[model.Part]:
+    """The files that make a world."""
+    airframe = model.load_vehicle(vehicle)
+    parts = [airframe, model.load_gear(gear, gear_set)]
+    if sensing is not None:
+        parts = [model.without_sensors(airframe), parts[1], model.load_sensors(sensing)]
+    return parts
 
 
 def _numbers(name: str, value: npt.ArrayLike | None) -> npt.NDArray[Any]:

@@ -13,7 +13,7 @@ enum
 {
     LANES = 8,  // of a group of worlds
     FILE_BUFFER = 1 << 20,
-    N_FLOATS = 16  // p, v, q, w, f
+    N_FLOATS = 19  // p, v, q, w, f, readings
 };
 
 _Static_assert((int)IVL_PORT_SLOTS >= (int)LANES, "a slot for each lane");
@@ -86,7 +86,8 @@ enum
     FAULT_UPSIDE_DOWN,
     FAULT_IMPACT,
     FAULT_HANGING,
-    FAULT_VITALS,  ///< battery, radio or autopilot
+    FAULT_VITALS,    ///< battery, radio or autopilot
+    FAULT_READINGS,  ///< of camera, ranging and flow sensor: any value at any time
     FAULT_COUNT
 };
 
@@ -96,9 +97,9 @@ static const float NUMBERS[] = {NAN,      -NAN,      INFINITY, -INFINITY, FLT_MA
 static float *number_of(ivl_in_t *in, uint32_t i)
 {
     float *const fields[N_FLOATS] = {
-        &in->p_WB_m.x,    &in->p_WB_m.y,   &in->p_WB_m.z,   &in->v_WB_mps.x, &in->v_WB_mps.y,  &in->v_WB_mps.z,
-        &in->q_WB.x,      &in->q_WB.y,     &in->q_WB.z,     &in->q_WB.w,     &in->w_B_radps.x, &in->w_B_radps.y,
-        &in->w_B_radps.z, &in->f_B_mps2.x, &in->f_B_mps2.y, &in->f_B_mps2.z,
+        &in->p_WB_m.x,   &in->p_WB_m.y,   &in->p_WB_m.z,   &in->v_WB_mps.x,  &in->v_WB_mps.y,  &in->v_WB_mps.z,  &in->q_WB.x,
+        &in->q_WB.y,     &in->q_WB.z,     &in->q_WB.w,     &in->w_B_radps.x, &in->w_B_radps.y, &in->w_B_radps.z, &in->f_B_mps2.x,
+        &in->f_B_mps2.y, &in->f_B_mps2.z, &in->rrev.value, &in->range.value, &in->flow.value,
     };
     return fields[i];
 }
@@ -170,6 +171,19 @@ static void spoil_vitals(const fault_t *fault, ivl_vitals_t *vitals)
     }
 }
 
+/// New at each tick, so that the core has the most to do; some from the future, some old, some wildly off.
+static void spoil_readings(recorder_t *r, const fault_t *fault, ivl_in_t *in)
+{
+    const float limits[] = {25.0f, 5.0f, 50.0f};
+    for (uint32_t i = 0; i < 3u; i++)
+    {
+        ivl_reading_t *const readings[] = {&in->rrev, &in->range, &in->flow};
+        readings[i]->t_us = in->t_us - below(r, (fault->field < 4u) ? 150000u : 3000u) + ((fault->field == 5u) ? 2000u : 0u);
+        readings[i]->value = between(r, (fault->field < 10u) ? -limits[i] : 0.0f, limits[i]);
+        readings[i]->valid = (uint8_t)(below(r, 8) != 0u);
+    }
+}
+
 static void spoil(recorder_t *r, const fault_t *fault, ivl_in_t *in)
 {
     switch (fault->kind)
@@ -207,6 +221,9 @@ static void spoil(recorder_t *r, const fault_t *fault, ivl_in_t *in)
         break;
     case FAULT_VITALS:
         spoil_vitals(fault, &in->vitals);
+        break;
+    case FAULT_READINGS:
+        spoil_readings(r, fault, in);
         break;
     default:
         spoil_request(fault, &in->cmd);

@@ -16,8 +16,8 @@ static void test_reference_begins_at_the_present_position_and_speed(void)
     const ivl_vec3_t p = {0.3f, -0.2f, 0.9f};
     ivl_approach_t   approach;
     // velocity component along 60 degrees: 0.5 cos 60 + 1.0 sin 60 = 1.1160
-    ivl_approach_begin(&approach, p, ivl_vec3(0.5f, 0.7f, 1.0f), 2.5f, 1.04719755f);
-    const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, DT_S);
+    ivl_approach_begin(&cfg, &approach, p, ivl_vec3(0.5f, 0.7f, 1.0f), 2.5f, 1.04719755f);
+    const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
     TEST_ASSERT_EQUAL_MEMORY(&p, &ref.p_W_m, sizeof p);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, 1.1160254f * 0.5f, ref.v_W_mps.x);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, ref.v_W_mps.y);
@@ -31,7 +31,7 @@ static void test_path_from_rest_follows_constant_acceleration_then_constant_spee
 {
     const ivl_cfg_t cfg = defaults();
     ivl_approach_t  approach;
-    ivl_approach_begin(&approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 0.0f), 2.5f, IVL_HALF_PI);
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 0.0f), 2.5f, IVL_HALF_PI);
     const float t_ramp_s = 2.5f / 4.3f;
     const float s_ramp_m = 0.5f * 2.5f * t_ramp_s;
     for (int i = 0; i < 1000; i++)
@@ -39,7 +39,7 @@ static void test_path_from_rest_follows_constant_acceleration_then_constant_spee
         const float           t_s = (float)i * DT_S;
         const bool            is_ramp = t_s < t_ramp_s;
         const float           s_m = is_ramp ? 0.5f * 4.3f * t_s * t_s : s_ramp_m + 2.5f * (t_s - t_ramp_s);
-        const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, DT_S);
+        const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, s_m, ref.p_W_m.z);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, is_ramp ? 4.3f * t_s : 2.5f, ref.v_W_mps.z);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.0f, ref.p_W_m.x);
@@ -53,12 +53,12 @@ static void test_speed_is_exactly_the_target_after_the_ramp(void)
     for (int k = 0; k < 4; k++)
     {
         ivl_approach_t approach;
-        ivl_approach_begin(&approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(starts[k], 0.0f, 0.0f), 2.5f, 0.0f);
+        ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(starts[k], 0.0f, 0.0f), 2.5f, 0.0f);
         for (int i = 0; i < 500; i++)
         {
-            (void)ivl_approach_next(&cfg, &approach, DT_S);
+            (void)ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
         }
-        const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, DT_S);
+        const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
         TEST_ASSERT_FLOAT_WITHIN(3.0e-7f, 2.5f, ref.v_W_mps.x);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 0.0f, ref.a_W_mps2.x);
     }
@@ -68,10 +68,10 @@ static void test_vehicle_already_at_speed_just_holds_it(void)
 {
     const ivl_cfg_t cfg = defaults();
     ivl_approach_t  approach;
-    ivl_approach_begin(&approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 2.5f), 2.5f, IVL_HALF_PI);
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 2.5f), 2.5f, IVL_HALF_PI);
     for (int i = 0; i < 100; i++)
     {
-        const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, DT_S);
+        const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 0.0f, ref.a_W_mps2.z);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 2.5f, ref.v_W_mps.z);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, 2.5f * DT_S * (float)i, ref.p_W_m.z);
@@ -86,12 +86,12 @@ static void test_reference_is_consistent_with_its_derivatives_for_random_paths(v
     for (int i = 0; i < 1000; i++)
     {
         ivl_approach_t approach;
-        ivl_approach_begin(&approach, rng_vec3(&rng, 1.0f), rng_vec3(&rng, 3.0f), rng_float(&rng, 0.1f, 6.0f),
+        ivl_approach_begin(&cfg, &approach, rng_vec3(&rng, 1.0f), rng_vec3(&rng, 3.0f), rng_float(&rng, 0.1f, 6.0f),
                            rng_float(&rng, 0.0f, IVL_HALF_PI));
-        ivl_reference_t a = ivl_approach_next(&cfg, &approach, DT_S);
+        ivl_reference_t a = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
         for (int k = 0; k < 100; k++)
         {
-            const ivl_reference_t b = ivl_approach_next(&cfg, &approach, DT_S);
+            const ivl_reference_t b = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
             const ivl_vec3_t      mean_v = ivl_scale(ivl_add(a.v_W_mps, b.v_W_mps), 0.5f);
             const ivl_vec3_t      p = ivl_add(a.p_W_m, ivl_scale(mean_v, DT_S));
             const ivl_vec3_t      v = ivl_add(a.v_W_mps, ivl_scale(a.a_W_mps2, DT_S));

@@ -46,7 +46,8 @@ static void test_latch_copies_everything_of_the_tick(void)
     // When it is latched
     ivl_snapshot_t s;
     memset(&s, 0xff, sizeof s);
-    ivl_trigger_latch(&s, &sample, ceiling, cues, &policy);
+    const ivl_seen_t seen = {ceiling, cues};
+    ivl_trigger_latch(&s, &sample, &seen, &policy);
 
     // Then the snapshot has all of them
     TEST_ASSERT_EQUAL_UINT64(11, s.t_us);

@@ -25,7 +25,7 @@ from unicorn import arm_const as uc_arm
 
 FLASH, FLASH_SIZE = 0x08000000, 1 << 20
 RAM, RAM_SIZE = 0x20000000, 128 << 10
-SLOTS, SLOT_SIZE = RAM, 1024
+SLOTS, SLOT_SIZE = RAM, 2048
 INPUT, OUTPUT = RAM + 0x8000, RAM + 0x9000
 STACK_TOP = RAM + RAM_SIZE
 STOP = FLASH + FLASH_SIZE - 4
@@ -80,6 +80,11 @@ class Chip:
             symbols = elf.get_section_by_name(".symtab")
             self._function = {s.name: s["st_value"] for s in symbols.iter_symbols() if s["st_info"].type == "STT_FUNC"}
         self._size = {name: layout.struct(program, name)[1] for name in ("ivl_cfg_t", "ivl_policy_t", "ivl_in_t")}
+        used = max(
+            self._size["ivl_cfg_t"] - _STATE_AT, _STATE_AT + layout.struct(program, "ivl_state_t")[1] - SLOT_SIZE
+        )
+        if used > 0:
+            raise RuntimeError(f"{program}: configuration or state is {used} bytes larger than its place here")
         self._phase_at = next(leaf.offset for leaf in layout.struct(program, "ivl_out_t")[0] if leaf.name == "phase")
         self._decoder = capstone.Cs(capstone.CS_ARCH_ARM, capstone.CS_MODE_THUMB | capstone.CS_MODE_MCLASS)
         self._decoder.detail = True

@@ -25,15 +25,23 @@ class Recording:
     replies: Path
 
 
-def record(folder: Path, n_ticks: int, seed: int, fault_norm: float = 0.01) -> Recording:
-    """Fly until `n_ticks` or more are recorded: six gears in turn, each batch with parameters and faults of its own."""
+def record(folder: Path, n_ticks: int, seed: int, fault_norm: float = 0.01, source: int | None = None) -> Recording:
+    """Fly until `n_ticks` or more are recorded: six gears in turn, each batch with parameters and faults of its own.
+
+    Args:
+        folder: Where the two files go.
+        n_ticks: Least number of ticks.
+        seed: Of everything random.
+        fault_norm: Chance per tick that a fault begins.
+        source: `firmware.d_source` of all batches; None: each draws its own.
+    """
     recording = Recording(folder / f"requests-{seed}.bin", folder / f"replies-{seed}.bin")
     rng = np.random.default_rng(seed)
     n_batch, flown = 0, 0
     with _recorder(recording, fault_norm, seed) as attach:
         while flown < n_ticks:
             gear, vehicle = GEARS[n_batch % len(GEARS)], VEHICLES[n_batch // len(GEARS) % len(VEHICLES)]
-            world = ivl.World(vehicle, gear, "as_simulated", **_overrides(rng))
+            world = ivl.World(vehicle, gear, "as_simulated", **_overrides(rng), **_sensing(rng, source))
             attach(world)
             flown += _fly(world, rng)
             n_batch += 1
@@ -74,6 +82,39 @@ def _overrides(rng: np.random.Generator) -> dict[str, float]:
         "firmware.cut_on_contact": float(rng.integers(2)),
         "end.time_max": 4.0,
         "end.contact_time": rng.uniform(0.2, 1.0),
+    }
+
+
+def _sensing(rng: np.random.Generator, source: int | None) -> dict[str, float]:
+    """A source of the distance with all sensors that could serve it, some of them with what it would rather not have."""
+    inertial = rng.integers(2)
+    return {
+        "firmware.d_source": float(rng.integers(4) if source is None else source),
+        "firmware.d_predict": float(rng.integers(2)),
+        "firmware.of_source": float(rng.integers(2)),
+        "firmware.shape": float(rng.integers(3)),
+        "firmware.rrev_delay": rng.uniform(0.0, 0.03),
+        "firmware.range_delay": rng.uniform(0.0, 0.03),
+        "firmware.accel_delay": rng.uniform(0.0, 0.02),
+        "firmware.d_sigma_max": rng.uniform(0.05, 1.0),
+        "firmware.d_old_max": rng.uniform(0.05, 0.5),
+        "firmware.rrev_tau": rng.uniform(0.0, 0.1),
+        "firmware.kf_gate": rng.uniform(1.0, 5.0),
+        "sense.inertial": float(inertial),
+        "sense.attitude_integrated": float(inertial),
+        "sense.start_position_error": rng.uniform(0.0, 0.5),
+        "sense.accel_bias": rng.uniform(0.0, 0.3),
+        "sense.pose_drop": rng.uniform(0.0, 0.1),
+        "rrev.rate": rng.uniform(20.0, 200.0),
+        "rrev.delay": rng.uniform(0.0, 0.03),
+        "rrev.noise": rng.uniform(0.0, 0.2),
+        "rrev.noise_rel": rng.uniform(0.0, 0.1),
+        "rrev.max": 20.0,
+        "rrev.drop": rng.uniform(0.0, 0.1),
+        "range.rate": rng.uniform(0.0, 100.0),
+        "range.delay": rng.uniform(0.0, 0.03),
+        "range.noise": rng.uniform(0.0, 0.03),
+        "flow.rate": rng.uniform(0.0, 100.0),
     }
 
 
