@@ -135,11 +135,14 @@ class Experiment(Strict):
         """Episodes of `n_rollouts` that the budget pays for."""
         return self.budget // self.n_rollouts
 
+    def world_settings(self) -> dict[str, float]:
+        """World parameters that differ from what vehicle, gear and sensor set say."""
+        overrides = {name: setting.value for name, setting in self.overrides.items()}
+        return {**sensing.approach_settings(self.approach), **sensing.estimator_settings(self.estimator), **overrides}
+
     def make_world(self) -> World:
         """The world that this experiment flies in."""
-        overrides = {name: setting.value for name, setting in self.overrides.items()}
-        chosen = {**sensing.approach_settings(self.approach), **sensing.estimator_settings(self.estimator)}
-        return World(self.vehicle, self.gear, self.gear_set, self.sensing, **{**chosen, **overrides})
+        return World(self.vehicle, self.gear, self.gear_set, self.sensing, **self.world_settings())
 
     def make_learner(self, seed: int) -> Learner:
         """A new learner at the start of its search."""

@@ -30,6 +30,7 @@ class LandingSpec(BaseModel):
     vehicle: str = "habas2021"
     gear: str = "wide_short"
     gear_set: str = model.DEFAULT_GEAR_SET
+    sensing: str | None = None
     overrides: dict[str, float] = Field(default_factory=dict)
     speed_mps: Finite
     angle_deg: Finite
@@ -42,7 +43,7 @@ class LandingSpec(BaseModel):
 
     def make_world(self) -> World:
         """The world that the landing is flown in."""
-        return World(self.vehicle, self.gear, self.gear_set, **self.overrides)
+        return World(self.vehicle, self.gear, self.gear_set, self.sensing, **self.overrides)
 
     def fly(self, world: World | None = None, period_s: float = TRACE_PERIOD_S) -> tuple[World, Trace]:
         """Fly it and record the time series; a world that exists already saves building one."""
@@ -76,7 +77,8 @@ def of_rollout(experiment: Experiment, trial: int, theta: tuple[float, float], s
         vehicle=experiment.vehicle,
         gear=experiment.gear,
         gear_set=experiment.gear_set,
-        overrides={name: setting.value for name, setting in experiment.overrides.items()},
+        sensing=experiment.sensing,
+        overrides=experiment.world_settings(),
         speed_mps=experiment.speed_mps,
         angle_deg=experiment.angle_deg,
         rrev_c_per_s=theta[0],

@@ -86,7 +86,7 @@ def _overrides(rng: np.random.Generator) -> dict[str, float]:
 
 
 def _sensing(rng: np.random.Generator, source: int | None) -> dict[str, float]:
-    """A source of the distance with all sensors that could serve it, some of them with what it would rather not have."""
+    """A source of the distance, with all sensors that could serve it."""
     inertial = rng.integers(2)
     return {
         "firmware.d_source": float(rng.integers(4) if source is None else source),

@@ -80,7 +80,7 @@ class _Grid(Strict):
     def make_world(self, gear: str) -> World:
         """The world of one landing gear."""
         overrides = {name: setting.value for name, setting in self.overrides.items()}
-        return World(self.vehicle, gear, self.gear_set, **overrides)
+        return World(self.vehicle, gear, self.gear_set, None, **overrides)
 
     def approaches(self) -> list[tuple[float, float]]:
         """Speed (m/s) and angle (deg) of every cell."""
