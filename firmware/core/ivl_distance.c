@@ -14,6 +14,9 @@ static const uint64_t READING_US_MAX = 100000u;
 // the expected RREV is linear in the distance only far enough from the ceiling
 static const float LINEAR_D_M_MIN = 0.05f;
 
+// v / d is no nearly linear function of a distance that may well be zero: a start is this many standard deviations away, or is put there
+static const float START_SIGMAS = 2.0f;
+
 // after so many refusals in a row the estimate is wrong and not the measurements: it becomes uncertain again, the speed more than at a hover
 #define GATED_RUN_MAX 5u
 static const float RESTART_V_SIGMA_NORM = 10.0f;
@@ -35,8 +38,9 @@ static void start(const ivl_cfg_t *cfg, ivl_distance_t *distance, const ivl_sens
 {
     ivl_history_start(&distance->history);
     ivl_formula_start(&distance->formula);
-    ivl_filter_start(&distance->filter, cfg->h_ceil_m - sense->sample.p_WB_m.z, sense->sample.v_WB_mps.z, cfg->kf_d_sigma_m,
-                     cfg->kf_v_sigma_mps, cfg->kf_b_sigma_mps2);
+    const float d_m = cfg->h_ceil_m - sense->sample.p_WB_m.z, d_m_min = START_SIGMAS * cfg->kf_d_sigma_m;
+    ivl_filter_start(&distance->filter, (d_m > d_m_min) ? d_m : d_m_min, sense->sample.v_WB_mps.z, cfg->kf_d_sigma_m, cfg->kf_v_sigma_mps,
+                     cfg->kf_b_sigma_mps2);
     distance->motion = (ivl_motion_t){0.0f, 0.0f};
     distance->since_s = 0.0f;
     distance->range_d_m = 0.0f;

@@ -112,9 +112,9 @@ class Experiment(Strict):
     start: Literal["imparted", "flown"] = "imparted"
     sensing: str | None = Field(default=None, description="sensor set that replaces the vehicle's own sensing")
     approach: Literal["accelerate_hold", "constant_acceleration", "constant_rrev"] = "accelerate_hold"
-    estimator: Literal["known_height", "known_height_predicted", "formula", "kalman", "range"] | None = Field(
-        default=None, description="source of the distance; None: as vehicle or sensor set say"
-    )
+    estimator: (
+        Literal["known_height", "known_height_predicted", "formula", "formula_unguarded", "kalman", "range"] | None
+    ) = Field(default=None, description="source of the distance; None: as vehicle or sensor set say")
     overrides: dict[str, Setting] = Field(default_factory=dict)
     policy: Policy
     learner: LearnerChoice

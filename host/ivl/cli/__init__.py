@@ -12,6 +12,7 @@ from ivl.cli import (
     can_gateway,
     console,
     doctor,
+    estimate,
     export,
     figs,
     flash,
@@ -47,6 +48,7 @@ app.command("sweep", help=sweep.HELP)(sweep.sweep)
 app.command("map", help=sweep.MAP_HELP)(sweep.map_)
 app.command("report", help=report.HELP)(report.report)
 app.command("figs", help=figs.HELP)(figs.figs)
+app.command("estimate", help=estimate.HELP)(estimate.estimate)
 app.command("export", help=export.HELP)(export.export)
 
 

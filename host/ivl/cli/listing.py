@@ -26,6 +26,7 @@ class Kind(StrEnum):
 
     VEHICLES = "vehicles"
     GEARS = "gears"
+    SENSORS = "sensors"
     EXPERIMENTS = "experiments"
     LEARNERS = "learners"
     REWARDS = "rewards"
@@ -52,6 +53,9 @@ def _entries(kind: Kind) -> list[dict[str, Any]]:
     if kind is Kind.VEHICLES:
         vehicles = [model.load_vehicle(name) for name in model.list_vehicles()]
         return [{"name": v.name, "doc": v.doc} for v in vehicles]
+    if kind is Kind.SENSORS:
+        sets = [model.load_sensors(name) for name in model.list_sensor_sets()]
+        return [{"name": s.name, "doc": s.doc} for s in sets]
     if kind is Kind.GEARS:
         return [_gear(gear_set, name) for gear_set in model.list_gear_sets() for name in model.list_gears(gear_set)]
     if kind is Kind.EXPERIMENTS:

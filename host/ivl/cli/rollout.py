@@ -46,6 +46,9 @@ def rollout(
     gear: Annotated[str, typer.Option(help="Landing gear; see `ivl list gears`.")] = "wide_short",
     gear_set: Annotated[str, typer.Option(help="Set of landing gears.")] = model.DEFAULT_GEAR_SET,
     vehicle: Annotated[str, typer.Option(help="Vehicle; see `ivl list vehicles`.")] = "habas2021",
+    sensors: Annotated[
+        str | None, typer.Option(help="Sensor set in place of the vehicle's own sensing; see `ivl list sensors`.")
+    ] = None,
     start: Annotated[
         Start, typer.Option(help="At the approach velocity, from hover, or at the trigger.")
     ] = Start.IMPARTED,
@@ -65,7 +68,7 @@ def rollout(
     if plot and plot.suffix not in (".png", ".svg", ".pdf"):
         raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
     overrides = dict(parse_setting(text) for text in settings or [])
-    world = World(vehicle, gear, gear_set, **overrides)
+    world = World(vehicle, gear, gear_set, sensors, **overrides)
     flight = world.trace(
         speed, angle, rrev, moment, seed, start.value, distance, stream=stream, period_s=_TRACE_PERIOD_S
     )
