@@ -27,7 +27,9 @@ static float braking_mps(const ivl_cfg_t *cfg, ivl_approach_t *approach, float r
     }
     approach->target_mps = approach->last_mps;
     const float left_mps = approach->speed_mps - approach->last_mps;
-    const float asked_mps = cfg->shape_rrev_per_s * approach->speed_mps * dt_s;
+    // braking by less than the present RREV would let it run away
+    const float held_per_s = (rrev_per_s > cfg->shape_rrev_per_s) ? rrev_per_s : cfg->shape_rrev_per_s;
+    const float asked_mps = held_per_s * approach->speed_mps * dt_s;
     return (asked_mps < left_mps) ? asked_mps : left_mps;
 }
 

@@ -103,6 +103,46 @@ static void test_reference_is_consistent_with_its_derivatives_for_random_paths(v
     }
 }
 
+static void test_an_accelerating_approach_goes_on_beyond_the_commanded_speed_up_to_the_limit(void)
+{
+    ivl_cfg_t cfg = defaults();
+    cfg.shape = (uint8_t)IVL_SHAPE_ACCELERATE;
+    ivl_approach_t approach;
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 0.0f), 2.5f, IVL_HALF_PI);
+    for (int i = 0; i < 1000; i++)
+    {
+        const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
+        const float           expected = cfg.approach_accel_mps2 * DT_S * (float)i;
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, (expected < cfg.speed_mps_max) ? expected : cfg.speed_mps_max, ref.v_W_mps.z);
+    }
+}
+
+// at speed from the start, the cue as the path itself gives it
+static void test_holding_rrev_lets_the_speed_fall_with_the_distance_and_ends_at_the_stated_part(void)
+{
+    ivl_cfg_t cfg = defaults();
+    cfg.shape = (uint8_t)IVL_SHAPE_RREV;
+    const float    angle = 1.2f, d0_m = 2.0f;
+    ivl_approach_t approach;
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, -d0_m), ivl_vec3(2.5f * cosf(angle), 0.0f, 2.5f * sinf(angle)), 2.5f, angle);
+    float rrev = 0.0f;
+    bool  was_held = false;
+    while (approach.p_W_m.z < -0.2f)
+    {
+        const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, rrev, DT_S);
+        rrev = ref.v_W_mps.z / -ref.p_W_m.z;
+        TEST_ASSERT_TRUE(approach.speed_mps > 0.6f * 2.5f - 1.0e-4f);
+        if ((rrev > 3.06f) && (approach.speed_mps > 0.61f * 2.5f))
+        {
+            TEST_FAIL_MESSAGE("RREV is not held");
+        }
+        was_held = was_held || approach.closing;
+    }
+    TEST_ASSERT_TRUE(was_held);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 0.6f * 2.5f, approach.speed_mps);
+    TEST_ASSERT_TRUE(rrev > 5.0f);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -111,5 +151,7 @@ int main(void)
     RUN_TEST(test_speed_is_exactly_the_target_after_the_ramp);
     RUN_TEST(test_vehicle_already_at_speed_just_holds_it);
     RUN_TEST(test_reference_is_consistent_with_its_derivatives_for_random_paths);
+    RUN_TEST(test_an_accelerating_approach_goes_on_beyond_the_commanded_speed_up_to_the_limit);
+    RUN_TEST(test_holding_rrev_lets_the_speed_fall_with_the_distance_and_ends_at_the_stated_part);
     return UNITY_END();
 }

@@ -48,6 +48,36 @@ static void test_distance_is_invalid_when_altitude_is_no_number(void)
     TEST_ASSERT_FALSE(ceiling_at(-INFINITY, true).valid);
 }
 
+static void test_a_held_sample_is_carried_to_the_present_tick_if_asked(void)
+{
+    ivl_cfg_t   cfg;
+    ivl_sense_t sense;
+    ivl_cfg_defaults(&cfg);
+    cfg.d_predict = 1u;
+    ivl_sense_reset(&sense);
+    sense.pose_fresh = true;
+    sense.age_s = 0.012f;
+    sense.sample.p_WB_m.z = 1.6f;
+    sense.sample.v_WB_mps.z = 2.5f;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.47f, ivl_ceiling_compute(&cfg, &sense).d_ceil_m);
+    sense.sample.v_WB_mps.z = -2.5f;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.53f, ivl_ceiling_compute(&cfg, &sense).d_ceil_m);
+}
+
+static void test_a_height_that_is_hardly_known_gives_no_distance(void)
+{
+    ivl_cfg_t   cfg;
+    ivl_sense_t sense;
+    ivl_cfg_defaults(&cfg);
+    ivl_sense_reset(&sense);
+    sense.pose_fresh = true;
+    sense.sample.p_WB_m.z = 1.6f;
+    cfg.height_sigma_m = 0.12f;
+    TEST_ASSERT_EQUAL_FLOAT(0.12f, ivl_ceiling_compute(&cfg, &sense).d_sigma_m);
+    cfg.height_sigma_m = 0.13f;
+    TEST_ASSERT_FALSE(ivl_ceiling_compute(&cfg, &sense).valid);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -55,5 +85,7 @@ int main(void)
     RUN_TEST(test_distance_is_invalid_when_outside_its_range);
     RUN_TEST(test_distance_is_invalid_and_zero_when_there_is_no_fresh_sample);
     RUN_TEST(test_distance_is_invalid_when_altitude_is_no_number);
+    RUN_TEST(test_a_held_sample_is_carried_to_the_present_tick_if_asked);
+    RUN_TEST(test_a_height_that_is_hardly_known_gives_no_distance);
     return UNITY_END();
 }

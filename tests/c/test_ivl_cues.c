@@ -63,6 +63,29 @@ static void test_rate_of_rrev_is_acceleration_over_distance_plus_rrev_squared(vo
     }
 }
 
+static void test_flow_comes_from_its_sensor_only_if_asked_valid_and_young(void)
+{
+    ivl_cfg_t cfg;
+    ivl_cfg_defaults(&cfg);
+    ivl_in_t in = good_input();
+    in.t_us = 5000000u;
+    in.flow = (ivl_reading_t){4990000u, -3.5f, 1u};
+    const ivl_cues_t cues = {.rrev_per_s = 4.0f, .of_y_radps = -2.0f, .valid = true};
+    for (int i = 0; i < 6; i++)
+    {
+        ivl_in_t   spoiled = in;
+        ivl_cues_t taken = cues;
+        cfg.of_source = (uint8_t)(i != 1);
+        spoiled.flow.valid = (uint8_t)(i != 2);
+        spoiled.flow.t_us = (i == 3) ? 4700000u : spoiled.flow.t_us;
+        spoiled.flow.value = (i == 4) ? NAN : spoiled.flow.value;
+        taken.valid = i != 5;
+        ivl_cues_take_flow(&cfg, &spoiled, &taken);
+        TEST_ASSERT_EQUAL_FLOAT((i == 0) ? -3.5f : -2.0f, taken.of_y_radps);
+        TEST_ASSERT_EQUAL_FLOAT(4.0f, taken.rrev_per_s);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -71,5 +94,6 @@ int main(void)
     RUN_TEST(test_cues_are_invalid_and_zero_when_the_ceiling_is);
     RUN_TEST(test_cues_are_invalid_when_the_distance_is_not_positive);
     RUN_TEST(test_rate_of_rrev_is_acceleration_over_distance_plus_rrev_squared);
+    RUN_TEST(test_flow_comes_from_its_sensor_only_if_asked_valid_and_young);
     return UNITY_END();
 }

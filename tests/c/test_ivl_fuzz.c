@@ -28,7 +28,7 @@ typedef struct
 } flight_t;
 
 static uint64_t n_ticks_in[IVL_PHASE_COUNT];
-static uint64_t n_triggers, n_spoiled, n_cycles;
+static uint64_t n_triggers, n_estimated, n_spoiled, n_cycles;
 
 // ---- this file's own judgement of an input, from the stated ranges
 
@@ -87,6 +87,13 @@ static void random_cfg(flight_t *f)
     cfg->attached_s = rng_float(&f->rng, 0.0f, 0.2f);
     cfg->approach_s_max = rng_float(&f->rng, 0.1f, 1.0f);
     cfg->hang_s = rng_float(&f->rng, 0.02f, 0.1f);
+    cfg->d_source = (uint8_t)((rng_below(&f->rng, 2) == 0u) ? 0u : rng_below(&f->rng, 4));
+    cfg->d_predict = (uint8_t)rng_below(&f->rng, 2);
+    cfg->of_source = (uint8_t)rng_below(&f->rng, 2);
+    cfg->shape = (uint8_t)rng_below(&f->rng, 3);
+    cfg->d_sigma_norm_max = rng_float(&f->rng, 0.05f, 10.0f);
+    cfg->rrev_delay_s = rng_float(&f->rng, 0.0f, 0.03f);
+    cfg->accel_delay_s = rng_float(&f->rng, 0.0f, 0.02f);
     cfg->cut_at_inverted = (uint8_t)rng_below(&f->rng, 2);
     cfg->cut_on_contact = (uint8_t)rng_below(&f->rng, 2);
     TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_cfg_check(cfg));
@@ -145,12 +152,45 @@ static void random_vitals(flight_t *f)
     }
 }
 
+// readings of a ceiling that is somewhere, and of none
+static void random_reading(flight_t *f, ivl_reading_t *reading, float limit)
+{
+    const float    values[] = {NAN, INFINITY, -INFINITY, FLT_MAX};
+    const uint32_t dice = rng_below(&f->rng, 40);
+    *reading = (ivl_reading_t){f->fix.in.t_us - rng_below(&f->rng, 3000), rng_float(&f->rng, 0.0f, limit), (uint8_t)(dice != 39u)};
+    if (dice < 4u)
+    {
+        reading->value = values[dice];
+    }
+    if (dice == 4u)
+    {
+        reading->t_us += 5000u;
+    }
+}
+
+static void random_readings(flight_t *f)
+{
+    if (rng_below(&f->rng, 8) == 0u)
+    {
+        random_reading(f, &f->fix.in.rrev, 8.0f);
+    }
+    if (rng_below(&f->rng, 8) == 0u)
+    {
+        random_reading(f, &f->fix.in.range, 2.0f);
+    }
+    if (rng_below(&f->rng, 8) == 0u)
+    {
+        random_reading(f, &f->fix.in.flow, 8.0f);
+    }
+}
+
 static void next_input(flight_t *f)
 {
     ivl_in_t      *in = &f->fix.in;
     const uint64_t period_us = (uint64_t)(1.0e6f / f->fix.cfg.tick_hz);
     in->t_us = f->t_last_us + period_us;
     in->t_pose_us = in->t_us - rng_below(&f->rng, 4000);
+    random_readings(f);
     if (rng_below(&f->rng, 30) == 0u)
     {
         random_request(f);
@@ -209,6 +249,9 @@ static void check_trigger(flight_t *f, uint32_t n_trigger_before, bool is_pose_g
         TEST_ASSERT_TRUE(vitals_are_good(&f->fix.in.vitals, &f->fix.cfg));
         TEST_ASSERT_TRUE(state->snapshot.rrev_per_s >= state->snapshot.policy.rrev_c_per_s);
         TEST_ASSERT_TRUE((state->snapshot.rrev_per_s > 0.0f) && (state->snapshot.d_ceil_m > 0.0f));
+        TEST_ASSERT_TRUE(state->snapshot.d_sigma_m >= 0.0f);
+        TEST_ASSERT_TRUE(state->snapshot.d_sigma_m <= f->fix.cfg.d_sigma_norm_max * state->snapshot.d_ceil_m);
+        n_estimated += (f->fix.cfg.d_source != 0u) ? 1u : 0u;
         memcpy(&f->snapshot, &state->snapshot, sizeof f->snapshot);
     }
     TEST_ASSERT_TRUE(f->n_trigger_cycle <= 1u);
@@ -288,6 +331,7 @@ static void test_random_flights_have_visited_everything(void)
         TEST_ASSERT_TRUE_MESSAGE(n_ticks_in[i] > N_TICKS_ALL / 300u, ivl_phase_name((ivl_phase_t)i));
     }
     TEST_ASSERT_TRUE(n_triggers > N_FLIGHTS / 6u);
+    TEST_ASSERT_TRUE(n_estimated > N_FLIGHTS / 50u);
     TEST_ASSERT_TRUE(n_cycles > n_triggers);
     TEST_ASSERT_TRUE(n_spoiled > N_TICKS_ALL / 30u);
 }
