@@ -198,6 +198,24 @@ def test_hovering_vehicle_is_landed(source: CrazyflieSource) -> None:
     assert vehicle.position_W_m[2] < 0.1
 
 
+def test_ctrl_c_in_the_air_lands_the_vehicle(server: SilProcess, vertical: Experiment, script: Script) -> None:
+    def press(rollout: Rollout) -> None:
+        del rollout
+        raise KeyboardInterrupt
+
+    said: list[str] = []
+    options = Options(operator=script, rehearse=True, say=said.append)
+    source = CrazyflieSource(server.uri, vertical, options)
+    assert source._field is not None
+    source._field.before_approach = press  # type: ignore[method-assign]
+    with pytest.raises(KeyboardInterrupt):
+        next(source.fly(plan_of(GOOD)))
+    source.close()
+    assert said == ["vehicle: landed, disarmed"]
+    assert server.get("ivl.phase") == Phase.IDLE
+    assert server.get("stateEstimate.z") < 0.1
+
+
 def test_lost_camera_before_the_trigger_aborts_and_is_not_scored(
     server: SilProcess, vertical: Experiment, script: Script
 ) -> None:

@@ -172,7 +172,9 @@ def make_safe(vehicle: Vehicle) -> str:
         vehicle.stop_planner()
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
     finally:
+        # also when a second Ctrl-C ends the above: what is armed by itself again must have nothing to do
         if not vehicle.session.cf.lost:
+            vehicle.stop_planner()
             vehicle.arm(False)
             done.append("disarmed")
     return ", ".join(done)

@@ -1,0 +1,39 @@
+"""docs/HOST.md says what the code does: deadlines, checks, rules, exit codes."""
+
+import re
+from dataclasses import asdict
+from pathlib import Path
+
+from ivl import native
+from ivl.links import fields, preflight, vehicle
+from ivl.links.deadlines import DEADLINES
+from ivl.links.episode import HEIGHT_M_MIN, OUTSIDE_RULES
+
+PAGE = (Path(__file__).parents[2] / "docs" / "HOST.md").read_text(encoding="utf-8")
+
+
+def test_deadlines_are_those_of_the_code() -> None:
+    told = {name: float(value) for name, value in re.findall(r"^\| `(\w+_s\w*)` \| ([\d.]+) \|", PAGE, re.MULTILINE)}
+    assert told == {name: value for name, value in asdict(DEADLINES).items() if name != "window"}
+    assert f"together with {DEADLINES.window - 1} others (`window`)" in PAGE
+
+
+def test_rules_that_discard_a_flight_are_those_of_the_code() -> None:
+    told = re.search(r"An abort by one of the rules ([\w, ]+), or by a request", PAGE)
+    assert told is not None
+    assert set(told[1].split(", ")) == OUTSIDE_RULES - {"none"}
+    names = {native.library().rule_name(code) for code in range(64)}
+    assert names >= OUTSIDE_RULES, "each of them is a rule of the flight core"
+
+
+def test_numbers_of_the_preflight_are_those_of_the_code() -> None:
+    for text in (
+        f"{preflight.PINGS_MIN} pings: at most {100 * preflight.LOST_MAX:.0f} % lost, 95 % within "
+        f"{1e3 * preflight.P95_S_MAX:.0f} ms",
+        f"{preflight.BATTERY_V_MIN:.2f} V at rest",
+        f"at most {1e3 * preflight.SIGMA_M_MAX:.0f} mm, within {preflight.SIGMA_S:.0f} s",
+        f"below {HEIGHT_M_MIN} m of height",
+        f"{1 / vehicle.HEARTBEAT_S:.1f} Hz of vehicle time",
+    ):
+        assert text in PAGE, text
+    assert fields.Gate().battery_V == preflight.BATTERY_V_MIN
