@@ -96,6 +96,7 @@ def test_another_world_at_the_other_end_is_told(vertical: Experiment, plan: Plan
 
 
 def test_software_vehicle_gets_its_time_back(server: SilProcess, vertical: Experiment, plan: Plan) -> None:
+    server.set("sil.lockstep", 1)  # as a host that died would leave it
     fly_both(server, vertical, first(plan, 1))
     assert server.get("sil.lockstep") == 0
     assert server.get("sil.start") == 255

@@ -48,18 +48,13 @@ class LockStep:
     flight is a function of the packets alone: the same on a busy machine and on an idle one.
     """
 
-    def __init__(self, session: Session, was: int | None = None) -> None:
+    def __init__(self, session: Session) -> None:
         """Stop the vehicle's time, and learn where it stands.
-
-        Args:
-            session: The link.
-            was: How time is to go on after `close`: parameter sil.lockstep; omitted: as it is now.
 
         Raises:
             LinkError: The vehicle does not tell its time.
         """
         self._session = session
-        self.was = int(session.read(["sil.lockstep"])["sil.lockstep"]) if was is None else was
         block = LogBlock(("sil.time_ms",), 10)
         session.write({"sil.lockstep": 0})
         session.start_log(block)
@@ -87,6 +82,9 @@ class LockStep:
         self._session.write({"sil.run_to_ms": self._now_ms})
 
     def close(self) -> None:
-        """Let time pass again as it did before, unless the link is gone."""
+        """Let time pass as it did when the vehicle was started, unless the link is gone.
+
+        What it was before this host came may be what a host that died has left.
+        """
         if not self._session.cf.lost:
-            self._session.write({"sil.lockstep": self.was})
+            self._session.write({"sil.lockstep": self._session.default("sil.lockstep")})

@@ -57,7 +57,6 @@ class CrazyflieSource:
         self._vehicle: Vehicle | None = None
         self._field: Field | None = None
         self._tracking: Tracking | None = None
-        self._lockstep_was: int | None = None
         self.n_discarded = 0
         """Flights that were not scored and were flown again."""
         self._connect()
@@ -199,9 +198,7 @@ class CrazyflieSource:
         """Lock-step where it can be had; cameras have a time of their own."""
         if not software or self._tracking is not None:
             return WallClock()
-        clock = LockStep(session, self._lockstep_was)
-        self._lockstep_was = clock.was
-        return clock
+        return LockStep(session)
 
     def _make_field(self, vehicle: Vehicle, software: bool) -> Field:
         if software and not self.options.rehearse:
@@ -257,6 +254,8 @@ class CrazyflieSource:
 
     def _keep(self, landing: Landing) -> None:
         self._note(landing.rollout, "flown", landing)
+        if not self._is_sil:
+            self.options.say(f"flown: {int(landing.outcome['n_legs'][0])} legs hold, battery {landing.battery_V:.2f} V")
         folder = self.options.folder
         if folder is not None and landing.recording is not None:
             (folder / RECORDINGS).mkdir(exist_ok=True)

@@ -13,7 +13,8 @@ from ivl.links.connection import Connection
 from ivl.links.deadlines import DEADLINES, Deadlines
 
 _PORT_PARAM, _PORT_MEM, _PORT_LOG = 2, 4, 5
-_READ, _WRITE, _MEM_READ = 1, 2, 1
+_READ, _WRITE, _MISC, _MEM_READ = 1, 2, 3, 1
+_GET_DEFAULT = 8
 _MEM_CHUNK = 24
 _LOG_BYTES_MAX, _LOG_ITEMS_MAX = 26, 9
 _LOG_CREATE, _LOG_APPEND, _LOG_START = 6, 7, 3
@@ -72,6 +73,15 @@ class Session(Connection):
                 raise LinkError(f"{self.uri}: parameter {name}: its value came with {len(answer) - 3} bytes")
             self.values[name] = struct.unpack(element.pytype, answer[3:])[0]
         return {name: self.values[name] for name in names}
+
+    def default(self, name: str) -> float:
+        """Value of a parameter at the vehicle's start."""
+        element = self._param(name)
+        question = struct.pack("<BH", _GET_DEFAULT, element.ident)
+        answer = self.ask(_PORT_PARAM, _MISC, question, question, f"default of {name}")
+        if len(answer) != 4 + struct.calcsize(element.pytype) or answer[3] != 0:
+            raise LinkError(f"{self.uri}: parameter {name}: the vehicle does not tell its default")
+        return float(struct.unpack(element.pytype, answer[4:])[0])
 
     def write(self, values: Mapping[str, float], deadline_s: float | None = None) -> None:
         """Write parameters in any order; returns when the vehicle has acknowledged all of them."""

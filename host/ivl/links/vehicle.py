@@ -345,7 +345,8 @@ class Vehicle:
 
     def stop_planner(self) -> None:
         """Let the high-level commander ask for nothing any more: on the ground, or it takes off again."""
-        self._high_level(struct.pack("<BB", 3, 0), "stop of the high-level commander")
+        data = struct.pack("<BB", 3, 0)
+        self.session.ask(_PORT_HL, 0, data, data[:1], "stop of the high-level commander")
 
     def _high_level(self, data: bytes, what: str) -> None:
         answer = self.session.ask(_PORT_HL, 0, data, data[:1], what)
