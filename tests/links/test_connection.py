@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from fake import FakeVehicle
+from fake_vehicle import FakeVehicle
 
 from ivl.errors import ConfigError, LinkError
 from ivl.links.connection import check_uri

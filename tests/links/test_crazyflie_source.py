@@ -137,7 +137,7 @@ def freeze(server: SilProcess) -> None:
 
 
 def cut(server: SilProcess) -> None:
-    server.set("fault.cut_ms", 3000)
+    server.set("fault.cut_ms", 2500)
 
 
 def restart(server: SilProcess) -> None:
