@@ -134,7 +134,7 @@ class SilProcess:
         try:
             self._read_ports(self._process)
         except BaseException:
-            self.stop()
+            self.kill()
             raise
         finally:
             watchdog.cancel()

@@ -1,10 +1,14 @@
 """Unmodified cflib at the software vehicle: every family of packets, end to end."""
 
+import ast
 import itertools
 import os
 import struct
+import subprocess
+import sys
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
 import cflib.crtp
@@ -295,3 +299,19 @@ def test_a_damaged_model_is_refused_by_line(world, monkeypatch):
         monkeypatch.setattr(silproc, "model_text", lambda _, damage=damage: damage)
         with pytest.raises(LinkError, match=message):
             SilProcess(world).start()
+
+
+# ---- documentation
+
+
+def test_first_flight_of_the_documentation_lands(sil):
+    script = Path(__file__).parents[2] / "docs" / "first_flight.py"
+    result = subprocess.run([sys.executable, script, sil.uri], capture_output=True, text=True, timeout=60, check=False)
+    assert result.returncode == 0, result.stderr
+    assert "commit" in result.stdout
+    phase, snapshot = result.stdout.splitlines()[-2:]
+    assert phase.startswith(("phase 5 ", "phase 6 "))
+    values = ast.literal_eval(snapshot)
+    assert values["ivl.trg_seq"] == values["ivl.policy_seq"] == 7
+    assert values["ivl.trg_rrev"] == pytest.approx(4.85, abs=0.1)
+    assert sil.get("simTruth.z") > 2.0

@@ -250,7 +250,7 @@ def test_loss_is_as_asked_and_seeded(world, Raw, wait_for):
             for n in range(400):
                 client.send(b"\xfc" + struct.pack("<H", n))
                 if n % 50 == 49:
-                    # what is under way fits into the client's buffer; the number of packets seen tells when all have been
+                    # no more under way than fits into the client's buffer
                     wait_for("the packets", lambda n=n: sil.get("sil.n_rx") + sil.get("fault.n_lost") >= n + 1)
                     client.socket.settimeout(0.05)
                     with contextlib.suppress(TimeoutError):
