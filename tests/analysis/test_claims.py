@@ -108,7 +108,7 @@ def test_hind_legs_that_do_not_follow_or_touch_first_spoil_the_swing(trials: Tri
     frame = ideal(trials)
     assert claim(frame.assign(swing_completed_norm=0.5), 9).verdict == NO
     assert claim(frame.assign(fore_legs_first_norm=0.5), 9).verdict == NO
-    one = frame["fore_legs_first_norm"].where(frame["gear"] != "wide_long", 0.5)
+    one = frame["fore_legs_first_norm"].where(frame["gear"] != "wide_long", 0.8)
     assert claim(frame.assign(fore_legs_first_norm=one), 9).verdict == PARTLY
 
 

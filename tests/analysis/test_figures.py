@@ -54,7 +54,7 @@ def is_picture(path: Path) -> bool:
 
 
 def test_all_figures_are_drawn_in_vector_form_and_png(data: Campaign, tmp_path: Path) -> None:
-    drawn = paper.draw_all(data, tmp_path / "figures")
+    drawn = paper.draw_all(data, tmp_path / "figures", dpi=60)
     assert [p.name for p in drawn.files] == [f"{f.name}{s}" for f in paper.FIGURES for s in (".pdf", ".png")]
     assert all(is_picture(path) for path in drawn.files)
     assert not drawn.left_out

@@ -90,3 +90,7 @@ def test_difference_adds_variances() -> None:
     result = difference(Estimate(0.8, 0.77, 0.83, 9), Estimate(0.5, 0.46, 0.54, 4))
     assert (result.value, result.low, result.high) == pytest.approx((0.3, 0.25, 0.35))
     assert result.n == 4
+
+
+def test_difference_is_not_fooled_by_an_interval_cut_off_at_one() -> None:
+    assert difference(Estimate(0.99, 0.95, 1.0, 9), Estimate(0.5, 0.5, 0.5, 9)).high == pytest.approx(0.53)

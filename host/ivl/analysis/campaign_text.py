@@ -15,6 +15,13 @@ from ivl.analysis.separability import MODELS, separability
 
 SETUP = ("vehicle", "gear_set", "learner")
 PAPER_VEHICLE, DEFAULT_LEARNER = "habas2021", "bo"
+_SPANS = (
+    ("up to 1 m/s", 0.0, 1.0),
+    ("1 to 2 m/s", 1.0, 2.0),
+    ("2 to 3 m/s", 2.0, 3.0),
+    ("above 3 m/s", 3.0, np.inf),
+    ("all", 0.0, np.inf),
+)
 _SPACES = {"state": "(Vx, Vz, d)", "flow": "(RREV, OF_y)", "augmented": "(RREV, OF_y, d)"}
 
 Setup = tuple[str, ...]
@@ -209,11 +216,10 @@ def _against(part: pd.DataFrame, other: pd.DataFrame, vehicle: str, gear: str) -
     """One gear, two vehicles."""
     theirs, ours = part[part["gear"] == gear], other[other["gear"] == gear]
     rows = []
-    for low, high in ((0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (3.0, 99.0), (0.0, 99.0)):
+    for span, low, high in _SPANS:
         a, b = (frame[(frame["speed_mps"] > low) & (frame["speed_mps"] <= high)] for frame in (theirs, ours))
         if a.empty or b.empty:
             continue
-        span = "all" if high - low > 90 else f"above {low:g} m/s" if high > 90 else f"{low:g} to {high:g} m/s"
         solved = [f"{(cell_rates(frame)['n_solved'] > 0).mean():.2f}" for frame in (b, a)]
         policies = [_policy(frame) for frame in (b, a)]
         rows.append((span, show(mean_rate(b)), show(mean_rate(a)), show(compare(a, b)), *solved, *policies))

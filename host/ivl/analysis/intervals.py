@@ -106,7 +106,11 @@ def stratified_mean(values: npt.ArrayLike, stratum: npt.ArrayLike) -> Estimate:
 
 
 def difference(first: Estimate, second: Estimate) -> Estimate:
-    """`first - second` of two independent estimates with symmetric intervals; `n` is the smaller of the two."""
-    half = np.hypot(first.high - first.value, second.high - second.value)
+    """`first - second` of two independent estimates; `n` is the smaller of the two.
+
+    Of each the wider side counts: the other may have been cut off at 0 or 1.
+    """
+    sides = [max(side.high - side.value, side.value - side.low) for side in (first, second)]
+    half = np.hypot(sides[0], sides[1])
     value = first.value - second.value
     return Estimate(value, value - float(half), value + float(half), min(first.n, second.n))

@@ -69,7 +69,9 @@ def cell_rates(trials: pd.DataFrame, rate: str = RATE) -> pd.DataFrame:
 def mean_rate(trials: pd.DataFrame, rate: str = RATE) -> Estimate:
     """Mean landing rate over cells, each with the same weight, whatever its number of trials."""
     known = trials[trials[rate].notna()]
-    return stratified_mean(known[rate], known.groupby(list(CELL), observed=True).ngroup())
+    mean = stratified_mean(known[rate], known.groupby(list(CELL), observed=True).ngroup())
+    low, high = np.clip([mean.low, mean.high], 0.0, 1.0)
+    return Estimate(mean.value, float(low), float(high), mean.n)
 
 
 def profile(trials: pd.DataFrame, by: str, rate: str = RATE) -> pd.DataFrame:
