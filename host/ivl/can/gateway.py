@@ -71,7 +71,7 @@ class Gateway(asyncio.DatagramProtocol):
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
         notifier = can.Notifier(self._bus, [_Frames(self)], timeout=0.1, loop=loop)
-        loop.set_exception_handler(lambda _, context: self._fail(context.get("exception")))
+        loop.set_exception_handler(lambda _, context: self._fail(context.get("exception") or context["message"]))
         ticking = asyncio.ensure_future(self._tick_forever())
         try:
             done, _ = await asyncio.wait({ticking, self._failed}, return_when=asyncio.FIRST_COMPLETED)
