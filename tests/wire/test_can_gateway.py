@@ -4,7 +4,6 @@ import asyncio
 import errno
 import json
 import random
-import re
 import signal
 import socket
 import subprocess
@@ -22,7 +21,6 @@ from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
 from crtp_double import VALUES, Vehicle, value_of
 
-from ivl import cli
 from ivl.can import link
 from ivl.can.dbc import Codec
 from ivl.can.gateway import Options, make_gateway
@@ -369,42 +367,3 @@ def test_the_programs_over_multicast(connect: Any, vehicle: Vehicle) -> None:
     reports = [json.loads(output) for output, _ in outputs]
     assert all(report["n_packets_in"] > 80 for report in reports)
     assert reports[0]["n_given_up"] == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "code", "text"),
-    [
-        (["--interface", "virtual"], 2, "exactly one of --listen .* and --to"),
-        (["--to", "udp://127.0.0.1:19850"], 2, "--interface is needed"),
-        (["--interface", "virtual", "--to", "radio://0"], 2, "--to: value 'radio://0' is no UDP port"),
-        (["--interface", "virtual", "--listen", "127.0.0.1:99999"], 2, "--listen: value .* is no UDP port"),
-        (["--interface", "virtual", "--listen", ":1", "--bus-option", "x"], 2, "is no UDP port"),
-        (
-            ["--interface", "virtual", "--listen", "a:1", "--bus-option", "x"],
-            2,
-            "--bus-option 'x': expected NAME",
-        ),
-        (["--interface", "nosuch", "--listen", "127.0.0.1:1"], 1, "CAN interface nosuch"),
-        (
-            ["--interface", "socketcan", "--channel", "ivlnone0", "--listen", "a:1"],
-            1,
-            "CAN interface socketcan",
-        ),
-    ],
-)
-def test_wrong_options_are_one_line(
-    arguments: list[str], code: int, text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.run(["can-gateway", *arguments]) == code
-    error = capsys.readouterr().err
-    assert re.search(text, error)
-    assert error.count("\n") == 1
-
-
-def test_print_dbc_is_a_dbc(capsys: pytest.CaptureFixture[str]) -> None:
-    import cantools
-
-    assert cli.run(["can-gateway", "--print-dbc", "--node", "3"]) == 0
-    database = cantools.database.load_string(capsys.readouterr().out)
-    assert database.get_message_by_name("HEARTBEAT_HOST").frame_id == 0x703
-    assert database.get_message_by_name("POLICY_RREV").get_signal_by_name("rrev_c").is_float
