@@ -3,9 +3,11 @@
 import contextlib
 import os
 import random
+import re
 import signal
 import struct
 import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -14,7 +16,9 @@ import pytest
 from cflib.crazyflie.log import LogConfig
 
 from ivl import silproc
+from ivl.experiment import load
 from ivl.silproc import SilProcess
+from ivl.world import World
 
 ROOT = Path(__file__).parents[2]
 
@@ -395,3 +399,27 @@ def test_a_vehicle_that_dies_takes_the_others_with_it(world, wait_for):
     wait_for("the end", lambda: sil._process.poll() is not None)
     with pytest.raises(silproc.LinkError, match="ended unexpectedly"):
         sil.stop()
+
+
+def test_command_becomes_the_program(tmp_path):
+    file = tmp_path / "vehicle.txt"
+    ivl = [sys.executable, "-c", "from ivl.cli import main; main()", "sil"]
+    world = World("crazyflie21", "wide_long", **{"sense.latency": 0.01})
+    options = ["--vehicle", "crazyflie21", "--gear", "wide_long", "--set", "sense.latency=0.01"]
+    subprocess.run([*ivl, *options, "--write-model", str(file)], check=True)
+    assert file.read_text(encoding="ascii") == silproc.model_text(world)
+    with subprocess.Popen(
+        [*ivl, *options, "--port", "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as run:
+        assert re.fullmatch(r"vehicle 0: udp://127\.0\.0\.1:\d+\n", run.stdout.readline())
+        assert Path(f"/proc/{run.pid}/exe").resolve() == silproc.server_path()
+        run.send_signal(signal.SIGINT)
+        assert run.wait(20) == 0
+        assert "crazyflie21 with gear wide_long of table1" in run.stderr.read()
+
+
+def test_experiments_vehicle_is_flown(tmp_path):
+    file = tmp_path / "vehicle.txt"
+    ivl = [sys.executable, "-c", "from ivl.cli import main; main()", "sil"]
+    subprocess.run([*ivl, "--experiment", "experiments/paper_vertical.yaml", "--write-model", str(file)], check=True)
+    assert file.read_text(encoding="ascii") == silproc.model_text(load("experiments/paper_vertical.yaml").make_world())

@@ -29,7 +29,8 @@ Examples:
   ivl bench --pil
       also with the flight core on an emulated STM32, against real time
   ivl bench --udp
-      also a software vehicle over UDP: landings a second, and how long the paper's experiment takes to learn
+      also a software vehicle over UDP: landings a second, how long the paper's experiment takes to learn,
+      and how fast it runs freely while cflib logs
 """
 _MUJOCO_BENCH = Path(__file__).parents[3] / "tests" / "mujoco" / "bench.py"
 
@@ -80,9 +81,10 @@ def _udp_rates() -> dict[str, float]:
     """
     try:
         from ivl.links.bench import measure as measure_link
+        from ivl.links.stream import measure as measure_stream
     except ImportError as error:
         raise LinkError(f"--udp needs cflib: pip install 'ivl[link]' ({error})") from error
-    return measure_link()
+    return measure_link() | measure_stream()
 
 
 def _mujoco_rate() -> Callable[[], float]:
