@@ -21,8 +21,9 @@ from ivl.links import crazyflie, open_source
 from ivl.links import vehicle as vehicles
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.deadlines import Deadlines
+from ivl.links.episode import Rollout
 from ivl.links.options import Options
-from ivl.links.packets import Packet, PacketType
+from ivl.links.packets import Packet, PacketType, Phase
 from ivl.silproc import SilProcess
 from ivl.source import Plan, WorldSource
 
@@ -80,6 +81,28 @@ def test_learning_stores_the_same_bits_as_in_process(server: SilProcess, vertica
     assert rows_of(tmp_path / "link") == rows_of(tmp_path / "here")
     journal = (tmp_path / "link" / "flights.jsonl").read_text().splitlines()
     assert len(journal) == vertical.budget
+
+
+@pytest.mark.parametrize("theta", [(4.8, 8.0), (2.0, 5.0), (20.0, 8.0)], ids=["lands", "falls", "late"])
+def test_recorder_is_read_whatever_the_landing_comes_to(
+    server: SilProcess, vertical: Experiment, theta: tuple[float, float]
+) -> None:
+    with CrazyflieSource(server.uri, vertical, Options(keep_recordings=True)) as source:
+        landing = source.fly_one(Rollout(*theta, seed=5, stream=6))
+    rows = vertical.make_world().trace(2.5, 90.0, *theta, seed=5, stream=6, period_s=0.002).rows
+    recording = landing.recording
+    assert recording is not None
+    assert recording.trigger_row is not None
+    # row by row against the simulator's own time series, from the trigger on
+    first_flip = int(np.argmax(rows.phase == Phase.FLIP))
+    n = min(100, len(recording.rows) - recording.trigger_row, len(rows) - first_flip)
+    mine, known = recording.rows[recording.trigger_row :][:n], rows[first_flip:][:n]
+    assert n > 20
+    assert mine["phase"].tolist()[:20] == known.phase.tolist()[:20]
+    assert mine["thrust_N"][:20] == pytest.approx(known.thrust_cmd_N[:20], abs=0.2 / 255)
+    # what a tick senses is how the tick before it left the vehicle
+    assert mine["w_B_radps"][1:20] == pytest.approx(known.w_B_radps[:19], abs=1 / 32)
+    assert mine["p_W_m"][:20, 2] == pytest.approx(known.p_WB_m[:20, 2], abs=0.03)
 
 
 def test_another_world_at_the_other_end_is_told(vertical: Experiment, plan: Plan) -> None:

@@ -53,7 +53,11 @@ class SilField:
     def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
         """The simulator's truth."""
         outcome = self.extras.wait_for_outcome(self._before, policy_seq)
-        return outcome, self._vehicle.recording(policy_seq) if self._keep else None
+        if not self._keep:
+            return outcome, None
+        # the end of the cycle is also that of a recording which is not full yet
+        self._vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
+        return outcome, self._vehicle.recording(policy_seq)
 
 
 @dataclass(frozen=True)
