@@ -36,7 +36,7 @@ def write(trials: pd.DataFrame, states: pd.DataFrame, runs: Sequence[dict[str, A
         runs: What identifies each run.
     """
     parts = {tuple(map(str, key)): part for key, part in trials.groupby(list(SETUP), observed=True)}
-    paper = {key: part for key, part in parts.items() if key[0] == PAPER_VEHICLE and part["gear"].nunique() > 1}
+    paper = {key: part for key, part in parts.items() if key[0] == PAPER_VEHICLE}
     claims = {key: evaluate(part) for key, part in paper.items()}
     sections = (
         ("What was flown", _flown(parts, runs)),
