@@ -243,9 +243,11 @@ format: setup-dev ## format C and Python in place
 	@$(BIN)/clang-format -i $(C_FILES) < /dev/null
 
 .PHONY: bench
-bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 and UDP against real time
+bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 and UDP against real time, sweeps on 1 and 2 cores
 	$(say) 'bench'
 	@$(BIN)/ivl bench --pil --udp
+	$(say) 'bench: sweeps, overhead of a task, and what follows for larger machines'
+	@$(BIN)/python tools/scaling.py
 
 .PHONY: setup-dev
 setup-dev: $(VENV)/.stamp-dev ## add what tests and lint need to .venv

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from ivl import native, yamlfile
+from ivl import yamlfile
 from ivl.sweep import config, folder, plan, store, work
 from ivl.sweep.config import PolicyMap, Sweep
 
@@ -49,7 +49,7 @@ def fly(grid: Sweep | PolicyMap, run: Path, size: int, order: int = 1) -> Path:
     worlds = {gear: grid.make_world(gear) for gear in grid.gear_names()}
     folder.open_run(run, grid, worlds, size, resume=False).close()
     for task in plan.plan(grid, size)[::order]:
-        done = work.run_task(grid, worlds[task.gear], task, native.library().digest())
+        done = work.run_task(grid, worlds[task.gear], task)
         store.write_part(run, task.number, {**done.parts, "tasks": work.record(task, done)})
     return run
 

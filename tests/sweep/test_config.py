@@ -99,5 +99,8 @@ def test_a_plan_has_every_trial_once_whatever_the_size_of_its_tasks(size: int, t
 def test_tasks_are_small_enough_to_share_and_large_enough_to_pay() -> None:
     paper = config.load_sweep("sweeps/paper.yaml")
     assert plan.good_size(paper, 2) == plan.SIZE_MAX
-    assert plan.good_size(paper, 100) == 7200 // 800
-    assert plan.good_size(paper, 10_000) == plan.SIZE_MIN
+    assert plan.good_size(paper, 100) == 10
+    assert plan.good_size(paper, 10_000) == 27  # sqrt(7200 / 10): too few trials to keep so many busy
+    large = paper.model_copy(update={"trials": 50_000})
+    assert plan.good_size(large, 2) == plan.SIZE_MAX
+    assert plan.good_size(large, 10_000) == 1000  # tasks end no faster than the client takes them back

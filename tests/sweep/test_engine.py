@@ -110,7 +110,7 @@ def test_a_batch_system_s_workers_fly_the_sweep(
     """A stand-in for SLURM: `sbatch` starts the job's script at once, on this machine."""
     tools = tmp_path / "bin"
     tools.mkdir()
-    script(tools / "sbatch", f'bash "$1" > {tmp_path}/job.log 2>&1 &\necho $!')
+    script(tools / "sbatch", f'cp "$1" {tmp_path}/job.sh\nbash {tmp_path}/job.sh > {tmp_path}/job.log 2>&1 &\necho $!')
     script(tools / "scancel", 'kill "$1" 2> /dev/null; true')
     monkeypatch.setenv("PATH", f"{tools}:{Path(sys.executable).parent}:{os.environ['PATH']}")
     settings = {"cores": 1, "memory": "400MB", "processes": 1, "interface": "lo", "death-timeout": 30}

@@ -8,6 +8,7 @@ loses the tasks that were running. A task whose worker is lost goes to another o
 `failures` and flown again by the next `--resume`.
 """
 
+import pickle
 import time
 import uuid
 from collections.abc import Callable, Iterator
@@ -23,7 +24,7 @@ from ivl.errors import NativeError, RolloutError
 from ivl.sweep import cluster, folder, plan, schema, store
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.plan import Task
-from ivl.sweep.work import lost, record, run_task
+from ivl.sweep.work import lost, record, run_packed
 from ivl.world import World
 
 _dask: Any = distributed  # its calls carry no types
@@ -130,7 +131,8 @@ class _Session:
         done: set[int],
         on_standing: Callable[[Standing], None] | None,
     ) -> None:
-        self._run, self._grid, self._worlds = run_folder, grid, worlds
+        self._run, self._grid = run_folder, grid
+        self._worlds = {gear: pickle.dumps(world) for gear, world in worlds.items()}
         self.waiting = [task for task in tasks if task.number not in done]
         self._n_trials = sum(len(task.trials) for task in tasks)
         self._n_before = sum(len(task.trials) for task in tasks if task.number in done)
@@ -171,7 +173,7 @@ class _Session:
         """Hand out tasks until enough of them wait: not all at once, a scheduler's memory is finite too."""
         while len(tasks) < (1 + _AHEAD) * max(self._n_workers, 1) and (task := next(source, None)):
             future = client.submit(
-                run_task,
+                run_packed,
                 self._grid,
                 self._worlds[task.gear],
                 task,

@@ -15,7 +15,9 @@ from ivl.sweep.trials import Trial
 
 TASKS_PER_WORKER = 8  # at least so many if there are trials enough, so that the last ones end together
 SIZE_MIN, SIZE_MAX = 4, 32
-"""Trials of a task: fewer do not fill a native batch, more only make a lost worker cost more."""
+"""Trials of a task on a few workers: fewer do not fill a native batch, more only make a lost worker cost more."""
+OVERHEAD_PER_TRIAL = 0.1
+"""Time that a task costs client and scheduler, as a share of the time of a trial (measured: docs/SCALING.md)."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +48,16 @@ def plan(grid: Sweep | PolicyMap, size: int) -> list[Task]:
 
 
 def good_size(grid: Sweep | PolicyMap, n_workers: int) -> int:
-    """Trials per task that keep `n_workers` busy to the end without tasks that are too small."""
+    """Trials per task that keep `n_workers` busy to the end, with tasks that are neither too small nor too many.
+
+    The client takes tasks back one by one. Tasks of k trials end every k t / n_workers seconds, and each costs it o
+    seconds: from k = n_workers o / t on it keeps up. Where there are too few trials for that, sqrt(n o / t) balances
+    what all tasks cost the client against the length of the last one.
+    """
     n_trials = len(grid.approaches()) * len(grid.gear_names()) * (grid.trials if isinstance(grid, Sweep) else 1)
-    return int(np.clip(n_trials // (TASKS_PER_WORKER * max(n_workers, 1)), SIZE_MIN, SIZE_MAX))
+    shared = np.clip(n_trials // (TASKS_PER_WORKER * max(n_workers, 1)), SIZE_MIN, SIZE_MAX)
+    kept_up = min(n_workers * OVERHEAD_PER_TRIAL, np.sqrt(n_trials * OVERHEAD_PER_TRIAL))
+    return int(np.ceil(max(shared, kept_up)))
 
 
 def _chunks(items: Sequence[Trial], size: int) -> list[Sequence[Trial]]:

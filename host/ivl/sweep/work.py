@@ -4,6 +4,7 @@ A worker needs this package and the native library, and nothing of the client's 
 """
 
 import os
+import pickle
 import platform
 import time
 from collections.abc import Sequence
@@ -47,14 +48,19 @@ class Done:
     worker: str
 
 
-def run_task(grid: Sweep | PolicyMap, world: World, task: Task, library_sha256: str) -> Done:
-    """Fly a task on one thread; trials that raise are reported in `failures`, the others are not touched by it.
+def run_packed(grid: Sweep | PolicyMap, packed_world: bytes, task: Task, library_sha256: str) -> Done:
+    """`run_task` on a worker, with the world pickled: it cannot be unpacked by another native library.
 
     Raises:
         NativeError: This worker has another native library than the client, so that its bits would differ.
     """
     if _library_sha256() != library_sha256:
         raise NativeError(f"{native.library().path}: this worker's native library is not that of the client")
+    return run_task(grid, pickle.loads(packed_world), task)
+
+
+def run_task(grid: Sweep | PolicyMap, world: World, task: Task) -> Done:
+    """Fly a task on one thread; trials that raise are reported in `failures`, the others are not touched by it."""
     began, processor = time.monotonic(), time.process_time()
     with threadpool_limits(1):  # the number of BLAS threads changes the last bits of a search
         flown, failed = _fly_all_or_each(grid, world, task.trials)
