@@ -1,12 +1,13 @@
 """Synthetic campaigns with known answers, in the columns of the sweep's tables."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from ivl.sweep import schema
+from ivl.sweep import config, folder, plan, schema, store, work
 
 Rate = Callable[[pd.DataFrame], np.ndarray]
 """Landing rates from a table with the columns v (m/s), phi (deg) and k (trial)."""
@@ -54,6 +55,21 @@ def make_trials(
         "swing_completed_norm": 0.9,
     }
     return frame.assign(**values)
+
+
+def fly_sweep(grid: config.Sweep | config.PolicyMap, run: Path) -> Path:
+    """A run folder, flown in this process."""
+    worlds = {gear: grid.make_world(gear) for gear in grid.gear_names()}
+    folder.open_run(run, grid, worlds, 8, resume=False).close()
+    for task in plan.plan(grid, 8):
+        done = work.run_task(grid, worlds[task.gear], task)
+        store.write_part(run, task.number, {**done.parts, schema.TASKS: work.record(task, done)})
+    return run
+
+
+@pytest.fixture
+def fly() -> Callable[[config.Sweep | config.PolicyMap, Path], Path]:
+    return fly_sweep
 
 
 @pytest.fixture

@@ -6,12 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ivl import native
 from ivl.cli import run
 from ivl.errors import ConfigError, StoreError
 from ivl.plots import campaign, fig04_convergence, fig09_gears, paper
 from ivl.plots.campaign import Campaign
-from ivl.sweep import config, folder, plan, schema, store, work
+from ivl.sweep import config, schema
 
 Trials = Callable[..., pd.DataFrame]
 SPEEDS, ANGLES = (1.0, 2.0, 2.5, 3.0, 4.0), (20.0, 45.0, 70.0, 90.0)
@@ -111,20 +110,11 @@ def test_failures_are_never_drawn_over_successes(data: Campaign) -> None:
     assert campaign.points(data.preferred(*campaign.SETUP))["rate_norm"].is_monotonic_increasing
 
 
-@pytest.fixture
-def real_run(tmp_path: Path) -> Path:
-    """The run folder of a small sweep, flown in this process."""
+def test_figures_of_a_real_sweep_from_the_command_line(
+    fly: Callable[[config.Sweep, Path], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     settings = ["speeds_mps=[2.5, 4.0]", "angles_deg=[60.0, 90.0]", "gears=[wide_short]", "budget=32"]
-    grid = config.load_sweep("sweeps/smoke.yaml", settings)
-    world, folder_path = grid.make_world("wide_short"), tmp_path / "run"
-    folder.open_run(folder_path, grid, {"wide_short": world}, 8, resume=False).close()
-    for task in plan.plan(grid, 8):
-        done = work.run_task(grid, world, task, native.library().digest())
-        store.write_part(folder_path, task.number, {**done.parts, schema.TASKS: work.record(task, done)})
-    return folder_path
-
-
-def test_figures_of_a_real_sweep_from_the_command_line(real_run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    real_run = fly(config.load_sweep("sweeps/smoke.yaml", settings), tmp_path / "run")
     assert run(["figs", str(real_run), "--only", "fig09", "--only", "fig06", "--svg", "--json"]) == 0
     files = [Path(f) for f in json.loads(capsys.readouterr().out)["files"]]
     names = [f"{name}{suffix}" for name in ("fig06_flow_space", "fig09_gears") for suffix in (".svg", ".png")]

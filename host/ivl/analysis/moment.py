@@ -16,7 +16,7 @@ from sklearn.model_selection import GroupKFold  # type: ignore[import-untyped]
 
 from ivl.analysis.intervals import Estimate
 
-FOLDS, BOOTSTRAPS = 5, 400
+FOLDS, BOOTSTRAPS = 5, 200
 
 FloatArray = npt.NDArray[np.float64]
 

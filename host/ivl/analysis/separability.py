@@ -28,7 +28,7 @@ from sklearn.svm import SVC  # type: ignore[import-untyped]
 
 from ivl.analysis.intervals import Estimate
 
-FOLDS, BOOTSTRAPS = 5, 400
+FOLDS, BOOTSTRAPS = 5, 200
 N_POINTS_MAX = 6000
 """More points than this are thinned, whole conditions at a time: the kernel matrix grows with the square."""
 
