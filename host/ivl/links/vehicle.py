@@ -15,6 +15,7 @@ import numpy as np
 
 from ivl import native
 from ivl.errors import LinkError, RolloutError
+from ivl.links import recorder
 from ivl.links.clock import Clock, WallClock
 from ivl.links.packets import (
     STATUS_TEXT,
@@ -26,18 +27,14 @@ from ivl.links.packets import (
     Status,
     decode,
     encode,
-    record_header,
-    record_rows,
 )
 from ivl.links.tables import LogBlock, Session
 from ivl.world import World
 
 HEARTBEAT_S = 0.08
 """Vehicle time between two commands: 12.5 Hz; the vehicle aborts after `host_s_max`, 0.5 s."""
-MEMORY_RECORDER = 0x18
 _PORT_SUPERVISOR, _PORT_HL, _PORT_PLATFORM, _APP = 9, 8, 13, 2
 _ECHO_S, _ECHO_POLL_S = 2.0, 0.01
-_RECORDER_TRIES = 3
 _WALL_POLL_S = 0.005
 _LOGS_S = 3.0
 
@@ -380,27 +377,8 @@ class Vehicle:
         return Snapshot(int(seq), *(float(value) for value in rest))
 
     def recording(self, policy_seq: int) -> Recording:
-        """Download the flight recorder of the landing that flew a policy.
-
-        Raises:
-            LinkError: There is no recorder, it is still recording, or it holds another landing.
-        """
-        number = self.session.memory(MEMORY_RECORDER)
-        if number is None:
-            raise LinkError(f"{self.session.uri}: the vehicle has no flight recorder (memory 0x18)")
-        size = native.library().layout(native.LAYOUT_RECORD_HEADER)[1].itemsize
-        row_size = native.library().layout(native.LAYOUT_RECORD_ROW)[1].itemsize
-        for _ in range(_RECORDER_TRIES):
-            head = self.session.read_memory(number, 0, size, "flight recorder: header")
-            header = record_header(head)
-            if not header["frozen"]:
-                raise LinkError("flight recorder: it is still recording")
-            if header["policy_seq"] not in (0, policy_seq):
-                raise LinkError(f"flight recorder: it holds policy {header['policy_seq']}, not {policy_seq}")
-            rows = self.session.read_memory(number, size, int(header["n_rows"]) * row_size, "flight recorder: rows")
-            if self.session.read_memory(number, 0, size, "flight recorder: header") == head:
-                return record_rows(header, rows)
-        raise LinkError("flight recorder: it kept changing while it was read")
+        """Download the flight recorder of the landing that flew a policy (errors as `recorder.download`)."""
+        return recorder.download(self.session, policy_seq)
 
 
 def _same(present: float, wanted: float) -> bool:
