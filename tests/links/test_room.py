@@ -12,7 +12,7 @@ import pytest
 from ivl import native
 from ivl.errors import ConfigError, RolloutError
 from ivl.experiment import Experiment
-from ivl.links import crazyflie
+from ivl.links import crazyflie, sil
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.episode import Rollout, make_safe, start_point
 from ivl.links.operators import OperatorStopped, Seen
@@ -217,17 +217,16 @@ def test_ctrl_c_in_the_air_lands_the_vehicle(server: SilProcess, vertical: Exper
 
 
 def test_lost_camera_before_the_trigger_aborts_and_is_not_scored(
-    server: SilProcess, vertical: Experiment, script: Script
+    server: SilProcess, vertical: Experiment, script: Script, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In real time: cameras have a clock of their own."""
+    monkeypatch.setattr(sil, "put_on_floor", lambda _: None)  # it has just been started there
     options = Options(operator=script, rehearse=True, mocap=mocap_config.load("simulator"))
     with CrazyflieSource(server.uri, vertical, options) as source:
         tracking, vehicle = source._tracking, vehicle_of(source)
         assert tracking is not None
         assert tracking.room is not None
         room = tracking.room
-        assert source._field is not None
-        source._field._place = None  # type: ignore[attr-defined]  # it stands there since the connection was made
 
         def occlude() -> None:
             while vehicle.phase != Phase.READY:
