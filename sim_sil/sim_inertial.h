@@ -33,7 +33,7 @@ void ivl_sim_reckoning_start(const ivl_sim_model_t *model, const ivl_sim_rng_t *
 /// Turn the attitude by one tick of the measured rate (mean of this and the last one).
 void ivl_sim_reckoning_turn(const ivl_sim_model_t *model, const double w_B_radps[3], ivl_sim_reckoning_t *reckoning);
 
-/// Move by one tick of the measured specific force, taken at the attitude that the autopilot believes.        [MODEL eq. 9.18]
+/// Move by one tick of the measured specific force, taken at the attitude that the autopilot believes.        [MODEL eq. 13.18]
 void ivl_sim_reckoning_move(const ivl_sim_model_t *model, const double q_WB[4], const double f_B_mps2[3], ivl_sim_reckoning_t *reckoning);
 
 #endif  // IVL_SIM_INERTIAL_H

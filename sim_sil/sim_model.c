@@ -90,7 +90,7 @@ static double reach(const ivl_sim_model_t *model)
     return farthest;
 }
 
-/// Butterworth by the bilinear transform.                                                             [MODEL eq. 9.17]
+/// Butterworth by the bilinear transform.                                                             [MODEL eq. 13.17]
 /// @return false if the corner is not below half the rate
 static bool derive_lowpass(double cutoff_hz, double rate_hz, ivl_sim_lowpass_t *filter)
 {

@@ -17,7 +17,7 @@ void ivl_approach_begin(const ivl_cfg_t *cfg, ivl_approach_t *approach, ivl_vec3
     };
 }
 
-// RREV stays as it is while the speed falls with the distance: v' = -RREV v                                     [MODEL eq. 9.16]
+// RREV stays as it is while the speed falls with the distance: v' = -RREV v                                     [MODEL eq. 13.16]
 static float braking_mps(const ivl_cfg_t *cfg, ivl_approach_t *approach, float rrev_per_s, float dt_s)
 {
     approach->closing = approach->closing || (rrev_per_s >= cfg->shape_rrev_per_s);

@@ -13,7 +13,7 @@ typedef struct
     bool  valid;        ///< false: the distance must not be used
 } ivl_ceiling_t;
 
-/// With cfg->d_predict the sample is carried on to the present tick at its own velocity.                          [MODEL eq. 9.1]
+/// With cfg->d_predict the sample is carried on to the present tick at its own velocity.                          [MODEL eq. 13.1]
 /// @return .valid is true only for a sample of this tick with d in [d_ceil_m_min, d_ceil_m_max] and height_sigma_m within d_sigma_norm_max of it
 ivl_ceiling_t ivl_ceiling_compute(const ivl_cfg_t *cfg, const ivl_sense_t *sense);
 #endif  // IVL_CEILING_H

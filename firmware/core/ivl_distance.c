@@ -109,7 +109,7 @@ static ivl_motion_t gained(const ivl_distance_t *distance, ivl_motion_t at, floa
 
 // ---- filter
 
-// expected: v / d.  The equation is multiplied by d, which saves the second division.                         [MODEL eq. 9.8]
+// expected: v / d.  The equation is multiplied by d, which saves the second division.                         [MODEL eq. 13.8]
 static ivl_innovation_t of_rrev(const ivl_cfg_t *cfg, const ivl_filter_t *filter, float rrev_per_s)
 {
     const float d_m = (filter->d_m > LINEAR_D_M_MIN) ? filter->d_m : LINEAR_D_M_MIN;

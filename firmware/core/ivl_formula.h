@@ -27,12 +27,12 @@ typedef struct
 /// No measurement yet.
 void ivl_formula_start(ivl_formula_t *formula);
 
-/// One measured RREV.                                                                                        [MODEL eq. 9.11 - 9.13]
+/// One measured RREV.                                                                                        [MODEL eq. 13.11 - 13.13]
 /// @param[in] period_s  since the last one, > 0
 /// @param[in] a_mps2    mean acceleration towards the ceiling in between
 void ivl_formula_push(const ivl_cfg_t *cfg, ivl_formula_t *formula, float rrev_per_s, float period_s, float a_mps2);
 
-/// The formula with its guards.                                                                              [MODEL eq. 9.14, 9.15]
+/// The formula with its guards.                                                                              [MODEL eq. 13.14, 13.15]
 /// @param[in] rate_var,rrev_var,a_var  variances of the three arguments
 ivl_formula_distance_t ivl_formula_compute(const ivl_cfg_t *cfg, float rrev_per_s, float rate_per_s2, float a_mps2, float rrev_var,
                                            float rate_var, float a_var);

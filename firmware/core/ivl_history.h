@@ -24,7 +24,7 @@ typedef struct
 /// Both integrals are 0 now.
 void ivl_history_start(ivl_history_t *history);
 
-/// One tick: a constant acceleration since the last one.                                                           [MODEL eq. 9.4]
+/// One tick: a constant acceleration since the last one.                                                           [MODEL eq. 13.4]
 void ivl_history_push(ivl_history_t *history, float a_mps2, float dt_s);
 
 /// Integrals a time after the last tick, if the acceleration stays as it is.
