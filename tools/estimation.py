@@ -142,7 +142,8 @@ def rows_of_landings(runs: dict[str, Any]) -> list[list[str]]:
     """Rates after learning."""
     return [
         [
-            label, LANDINGS[label][1], percent(run["best"]["rate_four_leg"]), percent(run["landing_rate_four_leg"]), number(run["rollouts_to_convergence"]["median"], 0),
+            label, LANDINGS[label][1], percent(run["best"]["rate_four_leg"]), percent(run["landing_rate_four_leg"]),
+            number(run["rollouts_to_convergence"]["median"], 0),
         ]
         for label, run in runs.items()
     ]  # fmt: skip
