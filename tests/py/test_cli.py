@@ -108,7 +108,8 @@ def test_rollout_refuses_wrong_arguments_in_one_line(capsys: Capture, extra: lis
 
 def test_list_names_everything(capsys: Capture) -> None:
     data = json_of(["list"], capsys)
-    assert set(data) == {"vehicles", "gears", "experiments", "learners", "rewards"}
+    assert set(data) == {"vehicles", "gears", "sensors", "experiments", "learners", "rewards"}
+    assert {"ideal", "mocap", "camera50", "ranger10"} <= {entry["name"] for entry in data["sensors"]}
     assert {entry["name"] for entry in data["vehicles"]} == {"habas2021", "crazyflie21"}
     assert len(data["gears"]) == 12
     assert "experiments/paper_vertical.yaml" in {entry["name"] for entry in data["experiments"]}
