@@ -4,6 +4,7 @@ import struct
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from fake_vehicle import FakeVehicle
@@ -66,7 +67,10 @@ def test_connect_works_when_every_answer_comes_twice(vehicle: FakeVehicle) -> No
         assert session.read_memory(0, 0, 3, "memory") == b"abc"
 
 
-def test_connect_uses_the_cached_tables_when_they_are_the_same(vehicle: FakeVehicle) -> None:
+def test_connect_uses_the_cached_tables_when_they_are_the_same(
+    vehicle: FakeVehicle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     for _ in range(2):
         with Session(vehicle.uri, SHORT) as session:
             assert session.has_param("ivl.mass")

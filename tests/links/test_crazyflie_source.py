@@ -1,6 +1,5 @@
 """Rollouts over a link against rollouts in this process: the same bits, whatever happens to the link."""
 
-import os
 import signal
 import sqlite3
 import subprocess
@@ -65,11 +64,10 @@ def test_outcomes_have_the_same_bits_as_in_process(server: SilProcess, vertical:
     ],
 )
 def test_outcomes_have_the_same_bits_when_numbers_are_not_of_single_precision(
-    plan: Plan, vertical: Experiment, settings: list[str]
+    plan: Plan, vertical: Experiment, settings: list[str], tmp_path: Path
 ) -> None:
-    data = vertical.to_yaml()
-    path = Path(os.environ["XDG_CACHE_HOME"]).parent / "other.yaml"
-    path.write_text(data)
+    path = tmp_path / "other.yaml"
+    path.write_text(vertical.to_yaml())
     chosen = experiment.load(str(path), settings)
     with SilProcess(chosen.make_world()) as server:
         fly_both(server, chosen, first(plan, 4))
