@@ -28,6 +28,23 @@ NOISE = {
     "sense.accel_noise": 0.1,
     "rotor.thrust_scatter": 0.02,
 }
+ONBOARD = {
+    "firmware.d_source": 2.0,
+    "firmware.rrev_delay": 0.02,
+    "firmware.accel_delay": 0.0075,
+    "sense.inertial": 1.0,
+    "sense.attitude_integrated": 1.0,
+    "sense.start_position_error": 0.3,
+    "sense.accel_noise": 0.5,
+    "sense.accel_bias": 0.15,
+    "sense.accel_cutoff": 30.0,
+    "sense.gyro_max": 34.9,
+    "rrev.rate": 50.0,
+    "rrev.delay": 0.02,
+    "rrev.noise_rel": 0.05,
+    "range.rate": 10.0,
+    "range.noise": 0.01,
+}
 HOOK_AND_LOOP = {"leg.adhesion": 1.0, "leg.stick_delay": 0.004, "leg.foot_damping": 5e-4}
 
 # name: vehicle, gear set, gear, overrides, speed, angle, RREV_c, M_yd, start, distance
@@ -42,6 +59,7 @@ CASES: dict[str, tuple[str, str, str, dict[str, float], float, float, float, flo
     "straight_legs": ("habas2021", "table1", "extra_narrow_long", {}, 3.0, 90.0, 5.0, 9.0, "imparted", None),
     "plate_first": ("habas2021", "table1", "extra_narrow_short", {}, 3.5, 90.0, 6.5, 4.0, "imparted", None),
     "hook_and_loop": ("habas2021", "table1", "wide_long", HOOK_AND_LOOP, 2.5, 75.0, 4.5, 7.0, "imparted", None),
+    "onboard": ("habas2021", "as_simulated", "wide_short", ONBOARD, 2.5, 80.0, 5.0, 10.0, "flown", None),
     "missed": ("habas2021", "table1", "wide_short", {}, 0.8, 60.0, 2.0, 9.0, "imparted", None),
 }
 
