@@ -48,8 +48,8 @@ build: ## compile firmware core and simulator into the library that Python loads
 	@+$(NATIVE) FLAVOUR=$(FLAVOUR) lib sil
 
 .PHONY: sil
-sil: setup build ## start the software vehicle on udp://127.0.0.1:19850 (VEHICLE=... GEAR=... SIL_ARGS='--speed 10')
-	@$(BIN)/ivl sil $(if $(VEHICLE),--vehicle $(VEHICLE)) $(if $(GEAR),--gear $(GEAR)) $(SIL_ARGS)
+sil: setup build ## start the software vehicle on udp://127.0.0.1:19850, with the world of EXPERIMENT or VEHICLE=... GEAR=... (SIL_ARGS='--speed 10')
+	@$(BIN)/ivl sil $(if $(VEHICLE)$(GEAR),$(if $(VEHICLE),--vehicle $(VEHICLE)) $(if $(GEAR),--gear $(GEAR)),--experiment $(EXPERIMENT)) $(SIL_ARGS)
 
 .PHONY: learn
 learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for another)

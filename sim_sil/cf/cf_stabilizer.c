@@ -50,6 +50,11 @@ static bool follows_estimator(ivl_phase_t phase)
     return phase == IVL_PHASE_IDLE || phase == IVL_PHASE_READY || phase == IVL_PHASE_APPROACH || phase == IVL_PHASE_ABORTED;
 }
 
+static void shift(ivl_reading_t *reading, uint64_t shift_us)
+{
+    reading->t_us += (reading->t_us > 0u) ? shift_us : 0u;  // 0: there is no such sensor
+}
+
 static void sense(ivl_cf_t *cf, const ivl_in_t *in)
 {
     const ivl_in_t before = cf->sensed;
@@ -57,6 +62,9 @@ static void sense(ivl_cf_t *cf, const ivl_in_t *in)
     cf->sensed = *in;
     cf->sensed.t_us += shift_us;
     cf->sensed.t_pose_us += shift_us;
+    shift(&cf->sensed.rrev, shift_us);
+    shift(&cf->sensed.range, shift_us);
+    shift(&cf->sensed.flow, shift_us);
     if (cf->set.estimator != IVL_CF_ESTIMATOR_KALMAN)
     {
         // the others have no position: it stands still and grows old

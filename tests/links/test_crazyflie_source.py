@@ -61,6 +61,7 @@ def test_outcomes_have_the_same_bits_as_in_process(server: SilProcess, vertical:
     [
         ["speed_mps=2.2", "angle_deg=60.3", "start=flown"],
         ["gear=narrow_long", "speed_mps=3.3", "sense.latency=0.02", "sense.position_noise=0.003"],
+        ["sensing=camera50_delay20_unknown", "approach=constant_rrev", "estimator=kalman", "start=flown"],
     ],
 )
 def test_outcomes_have_the_same_bits_when_numbers_are_not_of_single_precision(
