@@ -73,6 +73,17 @@ static void sense(app_t *app, const sensorData_t *sensors, const state_t *state,
     in->t_pose_us = app->t_pose_us;
 }
 
+// nor does its range: one that changes is new, one that does not grows old
+static void sense_range(app_t *app, uint64_t now_us)
+{
+    const float range_mm = atomic_load(&app->range_mm);
+    if ((range_mm > 0.0f) && ((range_mm < app->range_seen_mm) || (range_mm > app->range_seen_mm)))
+    {
+        app->range_seen_mm = range_mm;
+        app->in.range = app_range_reading(range_mm, now_us);
+    }
+}
+
 static void look_around(app_t *app, const setpoint_t *setpoint, uint64_t now_us)
 {
     const bool  is_idle = (setpoint->mode.z == modeDisable) && !(setpoint->thrust > 0.0f);
@@ -126,6 +137,7 @@ void controllerOutOfTree(control_t *control, const setpoint_t *setpoint, const s
 
     app_take_requests(app, now_us);
     sense(app, sensors, state, now_us);
+    sense_range(app, now_us);
     if (RATE_DO_EXECUTE(rate_hz, stabilizerStep))
     {
         look_around(app, setpoint, now_us);

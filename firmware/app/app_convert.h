@@ -3,6 +3,7 @@
 ///   gyro deg/s -> rad/s and accelerometer g -> m/s^2, both x forward, y left, z up as the core's B: no sign changes
 ///   attitude: the quaternion (x, y, z, w, body to world) is taken; the SDK's Euler angles are not, since their pitch has the other sign
 ///   position and velocity: SI, world z up, as they are
+///   range: mm -> m
 ///   thrust: N per motor -> share of THRUST_MAX (controlModeForce), which the SDK turns into PWM with its battery compensation
 ///   stock thrust: 0..65535 for the same share
 #ifndef APP_CONVERT_H
@@ -15,6 +16,8 @@
 static const float APP_RADPS_PER_DEGPS = 0.0174532925f;
 static const float APP_RAD_PER_DEG = 0.0174532925f;
 static const float APP_MPS2_PER_G = 9.80665f;
+static const float APP_M_PER_MM = 1.0e-3f;
+static const float APP_RANGE_MM_MAX = 32000.0f;  // the SDK's driver says 32767 for "nothing found"
 static const float APP_S_PER_MS = 1.0e-3f;
 static const float APP_S_PER_US = 1.0e-6f;
 static const float APP_STOCK_THRUST_MAX = 65535.0f;
@@ -59,6 +62,12 @@ static inline float app_norm_of_stock(float thrust)
 static inline float app_stock_of_norm(float norm)
 {
     return ivl_clamp(norm, 0.0f, 1.0f) * APP_STOCK_THRUST_MAX;
+}
+
+/// A reading of the ranging sensor that arrives now.
+static inline ivl_reading_t app_range_reading(float range_mm, uint64_t now_us)
+{
+    return (ivl_reading_t){.t_us = now_us, .value = range_mm * APP_M_PER_MM, .valid = (range_mm < APP_RANGE_MM_MAX) ? 1u : 0u};
 }
 
 /// Time between two instants of the microsecond clock, s; long ones are as good as infinite.

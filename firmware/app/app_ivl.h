@@ -76,6 +76,8 @@ typedef struct
     uint64_t       t_host_us;        ///< when the host last sent a command
     bool           has_host;         ///< it ever did
     _Atomic float  p_sigma_m;        ///< written by the app's task
+    _Atomic float  range_mm;         ///< of the ranging sensor that faces up, 0 without one; written by the app's task
+    float          range_seen_mm;    ///< of the last call
     atomic_bool    motors_bypassed;  ///< written by the app's task
     bool           configured;       ///< a configuration was put in force since the start
 

@@ -133,7 +133,7 @@ logVarId_t logGetVarId(const char *group, const char *name)
     return NOT_FOUND;
 }
 
-/// Of variables of type float: the app asks for no others.
+/// Of the two types that the app asks for.
 float logGetFloat(logVarId_t varid)
 {
     size_t              n;
@@ -142,6 +142,12 @@ float logGetFloat(logVarId_t varid)
     if (varid < n && logs[varid].type == IVL_CF_LOG_F32)
     {
         memcpy(&value, logs[varid].address, sizeof value);
+    }
+    else if (varid < n && logs[varid].type == IVL_CF_LOG_U16)
+    {
+        uint16_t whole;
+        memcpy(&whole, logs[varid].address, sizeof whole);
+        value = (float)whole;
     }
     return value;
 }

@@ -226,6 +226,11 @@ size_t appchannelReceiveDataPacket(void *buffer, size_t max_length, int timeout_
 
 logVarId_t logGetVarId(const char *group, const char *name)
 {
+    if (strcmp(group, "range") == 0)
+    {
+        TEST_ASSERT_EQUAL_STRING("up", name);
+        return sdk.has_range ? 8u : 0xffffu;
+    }
     TEST_ASSERT_EQUAL_STRING("kalman", group);
     TEST_ASSERT_EQUAL_STRING_LEN("varP", name, 4);
     return sdk.has_variance ? 7u : 0xffffu;
@@ -233,6 +238,10 @@ logVarId_t logGetVarId(const char *group, const char *name)
 
 float logGetFloat(logVarId_t varid)
 {
+    if (varid == 8u)
+    {
+        return sdk.range_up_mm;
+    }
     TEST_ASSERT_EQUAL_UINT16(7u, varid);
     return sdk.variance_m2;
 }

@@ -32,6 +32,8 @@ typedef struct
     bool         controller_runs;  ///< false: another controller is selected
     float        variance_m2;
     bool         has_variance;
+    float        range_up_mm;
+    bool         has_range;
     unsigned int motor_power_set;
     setpoint_t   setpoint;
     sensorData_t sensors;

@@ -546,6 +546,43 @@ static void test_position_that_is_uncertain_or_not_known_to_be_certain_refuses_t
     assert_phase(IVL_PHASE_READY);
 }
 
+static void test_range_that_changes_is_a_new_reading_in_metres(void)
+{
+    start_in_flight();
+    TEST_ASSERT_EQUAL_UINT64(0, ivl_app.in.range.t_us);  // no sensor, no reading
+    sdk.has_range = true;
+    app_task_start();
+    sdk.range_up_mm = 1234.0f;
+    run_task(1);
+    sdk_double_run(2);
+    const ivl_reading_t first = ivl_app.in.range;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 1.234f, first.value);
+    TEST_ASSERT_EQUAL_UINT8(1, first.valid);
+    TEST_ASSERT_TRUE((first.t_us > 0u) && (first.t_us <= sdk.now_us));
+
+    // the same again is not new; another one is
+    run_task(3);
+    sdk_double_run(5);
+    TEST_ASSERT_EQUAL_UINT64(first.t_us, ivl_app.in.range.t_us);
+    sdk.range_up_mm = 1200.0f;
+    run_task(1);
+    sdk_double_run(2);
+    TEST_ASSERT_TRUE(ivl_app.in.range.t_us > first.t_us);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 1.2f, ivl_app.in.range.value);
+}
+
+static void test_range_out_of_reach_is_told_as_such(void)
+{
+    start_in_flight();
+    sdk.has_range = true;
+    app_task_start();
+    sdk.range_up_mm = 32767.0f;
+    run_task(1);
+    sdk_double_run(2);
+    TEST_ASSERT_TRUE(ivl_app.in.range.t_us > 0u);
+    TEST_ASSERT_EQUAL_UINT8(0, ivl_app.in.range.valid);
+}
+
 static void test_motors_driven_past_the_controller_refuse_to_arm(void)
 {
     start_in_flight();
@@ -729,6 +766,8 @@ int main(void)
     RUN_TEST(test_host_that_falls_silent_aborts_and_the_set_point_is_given_up);
     RUN_TEST(test_estimator_that_stands_still_aborts);
     RUN_TEST(test_position_that_is_uncertain_or_not_known_to_be_certain_refuses_to_arm);
+    RUN_TEST(test_range_that_changes_is_a_new_reading_in_metres);
+    RUN_TEST(test_range_out_of_reach_is_told_as_such);
     RUN_TEST(test_motors_driven_past_the_controller_refuse_to_arm);
     RUN_TEST(test_nothing_arms_before_a_configuration_is_in_force);
     RUN_TEST(test_policy_is_echoed_as_it_is_in_force);
