@@ -1,4 +1,5 @@
 #include "sim_model.h"
+#include "ivl_cfg_name.h"
 
 #include <stdio.h>
 

@@ -3,6 +3,7 @@
 #include "FreeRTOS.h"
 #include "app_channel.h"
 #include "app_ivl.h"
+#include "ivl_cfg_name.h"
 #include "task.h"
 
 #define DEBUG_MODULE "IVL"

@@ -7,7 +7,6 @@
 #include "ivl_wire.h"
 
 #define ROW(ctype, group, name, field, unit, min, max, dflt, doc)  ROW_##field,
-#define NAME(ctype, group, name, field, unit, min, max, dflt, doc) name "\0"
 #define ENTRY(ctype, group, name, field, unit, min, max, dflt, doc)                                                                        \
     {offsetof(ivl_cfg_t, field), sizeof(ctype), (float)(min), (float)(max), (float)(dflt)},
 
@@ -15,9 +14,6 @@ enum
 {
     IVL_PARAMS(ROW) ROW_COUNT
 };
-
-// one behind the other
-static const char NAMES[] = IVL_PARAMS(NAME);
 
 // a member of one byte is a uint8_t, one of four a float
 typedef struct
@@ -114,27 +110,6 @@ int ivl_cfg_bad_row(const ivl_cfg_t *cfg)
 {
     const int row = bad_range(cfg);
     return (row >= 0) ? row : bad_match(cfg);
-}
-
-const char *ivl_cfg_name(int row)
-{
-    if ((row < 0) || (row >= (int)ROW_COUNT))
-    {
-        return NULL;
-    }
-    const char *name = NAMES;
-    for (; row > 0; row--)
-    {
-        while (*name++ != '\0')
-        {
-        }
-    }
-    return name;
-}
-
-const char *ivl_cfg_bad_name(const ivl_cfg_t *cfg)
-{
-    return ivl_cfg_name(ivl_cfg_bad_row(cfg));
 }
 
 ivl_status_t ivl_cfg_check(const ivl_cfg_t *cfg)

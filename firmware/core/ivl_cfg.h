@@ -19,14 +19,8 @@ void ivl_cfg_defaults(ivl_cfg_t *cfg);
 /// @return IVL_OK or IVL_ERR_RANGE
 ivl_status_t ivl_cfg_check(const ivl_cfg_t *cfg);
 
-/// Table name (for example "kp_pos_xy") of the first parameter that ivl_cfg_check refuses, NULL if all are good.  Static storage.
-const char *ivl_cfg_bad_name(const ivl_cfg_t *cfg);
-
-/// The same as a row number of IVL_PARAMS, -1 if all are good.
+/// Row of IVL_PARAMS of the first parameter that ivl_cfg_check refuses, -1 if all are good.
 int ivl_cfg_bad_row(const ivl_cfg_t *cfg);
-
-/// Name of a row of IVL_PARAMS, NULL for a number that is none.  Static storage.
-const char *ivl_cfg_name(int row);
 
 /// CRC-32 over the members in the order of IVL_PARAMS, little-endian, without padding: what a host compares with its own.
 uint32_t ivl_cfg_crc(const ivl_cfg_t *cfg);

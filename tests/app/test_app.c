@@ -7,6 +7,7 @@
 #include "app_convert.h"
 #include "app_ivl.h"
 #include "controller.h"
+#include "ivl_cfg_name.h"
 #include "sdk_double.h"
 #include "unity.h"
 

@@ -1,5 +1,6 @@
 /// @file test_ivl_cfg.c
 /// The parameter table and the check of a configuration, row by row; the log table's paths.
+#include "ivl_cfg_name.h"
 #include "test_ivl_support.h"
 
 typedef struct

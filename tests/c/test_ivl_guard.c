@@ -1,5 +1,6 @@
 /// @file test_ivl_guard.c
 /// One test for each safety rule: what it does in the phases of its row, and that it does nothing in the others.
+#include "ivl_cfg_name.h"
 #include "test_ivl_support.h"
 
 static const ivl_phase_t ALL[] = {IVL_PHASE_IDLE,  IVL_PHASE_READY,    IVL_PHASE_APPROACH, IVL_PHASE_FLIP,
