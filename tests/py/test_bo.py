@@ -38,13 +38,3 @@ def test_caution_prefers_what_is_known() -> None:
         learner.tell(theta, returns(theta))
     nearest = [np.abs(theta - learner.result.recommended).sum(axis=1).min() for learner in (bold, careful)]
     assert nearest[1] <= nearest[0]
-
-
-def test_lengths_are_fitted_again_when_the_data_have_grown_by_half() -> None:
-    learner = BOLearner([4.0, 5.0], [1.5, 1.5], bounds=BOUNDS, seed=4)
-    fitted = []
-    for _ in range(12):
-        theta = learner.ask()
-        learner.tell(theta, returns(theta))
-        fitted.append(learner.state_dict()["search"]["n_fitted"])
-    assert fitted == [8, 16, 24, 24, 40, 40, 40, 64, 64, 64, 64, 96]

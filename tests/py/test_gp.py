@@ -106,3 +106,11 @@ def test_very_short_and_very_long_lengths_equal_the_textbook_too(length: float) 
     assert gp.predict(at)[0] == pytest.approx(mean, abs=1e-7)
     assert gp.predict(at)[1] ** 2 == pytest.approx(np.diag(covariance), abs=1e-6)
     assert log_likelihood(x, y, hyper) == pytest.approx(likelihood, rel=1e-6, abs=1e-9)
+
+
+def test_a_fit_that_follows_is_no_worse_than_where_it_began_and_moves_by_its_step_at_most() -> None:
+    x, y = data(60)
+    start = Hyper(np.array([0.1, 0.1]), 0.05)
+    found = fit(x, y, HYPER, start, follow=True)
+    assert log_likelihood(x, y, found) > log_likelihood(x, y, start)
+    assert np.abs(found.log() - start.log()).max() == pytest.approx(0.3)

@@ -4,8 +4,8 @@ Every rollout counts for as long as it is remembered, failed ones too: they tell
 the start's spread, z = (theta - mu0) / sigma0, with y the returns shifted and scaled to mean 0 and variance 1:
 
     first episode     theta ~ N(mu0, diag sigma0^2), truncated to the bounds                             (1)
-    model             y = f(z) + noise, f a Gaussian process (see `ivl.learners.gp`), of all data after each episode;
-                      its lengths and noise ratio are fitted whenever the data have grown by `refit`
+    model             y = f(z) + noise, f a Gaussian process (see `ivl.learners.gp`), refitted after each episode:
+                      its lengths and noise ratio are searched up to `settled` rollouts, then followed
     later episodes    theta_n = argmax over the candidates of f_n, f_n a draw of the posterior           (2)
     recommended       argmax(mean(z) - caution sd(z))                                                    (3)
 
@@ -39,7 +39,7 @@ class BOOptions(Options):
     n_near: int = Field(default=300, ge=10, le=5000, description="candidates near what was best")
     n_elite: int = Field(default=20, ge=1, le=1000, description="policies that count as best")
     jitter: float = Field(default=0.25, gt=0, le=10, description="spread of the near candidates, in kernel lengths")
-    refit: float = Field(default=1.5, ge=1, le=10, description="growth of the data that calls for a new fit")
+    settled: int = Field(default=32, ge=0, le=4000, description="rollouts from which on a fit follows the one before")
     memory: int = Field(default=400, ge=8, le=4000, description="latest rollouts that the model is made from")
 
     @model_validator(mode="after")
@@ -62,7 +62,6 @@ class BOLearner(Learner):
         self._box = self._scale(np.stack([self.lo, self.hi]))
         self._prior = Hyper(np.full(self.dim, self.options.length), self.options.noise)
         self._hyper = self._prior
-        self._n_fitted = 0  # rollouts that the last fit knew
         self._gp: GaussianProcess | None = None
         self._best = np.zeros(self.dim)
         self._spread = self.sigma0.copy()
@@ -78,9 +77,8 @@ class BOLearner(Learner):
     def _update(self, theta: FloatArray, rewards: FloatArray, _meta: Meta, /) -> None:
         self._x = np.vstack([self._x, self._scale(theta)])[-self.options.memory :]
         self._rewards = np.append(self._rewards, rewards)[-self.options.memory :]
-        if self._n_told + rewards.size >= self.options.refit * self._n_fitted:
-            self._hyper = fit(self._x, self._values(), self._prior, self._hyper, self.options.noise_min)
-            self._n_fitted = self._n_told + rewards.size
+        follow = len(self._x) > self.options.settled
+        self._hyper = fit(self._x, self._values(), self._prior, self._hyper, self.options.noise_min, follow)
         self._refresh()
 
     def _refresh(self) -> None:
@@ -141,7 +139,6 @@ class BOLearner(Learner):
             "rewards": self._rewards.tolist(),
             "lengths": self._hyper.lengths.tolist(),
             "noise": self._hyper.noise,
-            "n_fitted": self._n_fitted,
             "spread": self._spread.tolist(),
         }
 
@@ -150,7 +147,6 @@ class BOLearner(Learner):
         self._x = np.array(state["z"], dtype=np.float64).reshape(-1, self.dim)
         self._rewards = np.array(state["rewards"], dtype=np.float64)
         self._hyper = Hyper(np.array(state["lengths"], dtype=np.float64), float(state["noise"]))
-        self._n_fitted = int(state["n_fitted"])
         self._spread = np.array(state["spread"], dtype=np.float64)
         if self._rewards.size:
             self._refresh()

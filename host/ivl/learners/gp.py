@@ -24,6 +24,7 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 SingleArray = npt.NDArray[np.float32]
 
+_SEARCH, _FOLLOW = (0.6, 0.3, 0.15), (0.3,)  # steps of a fit's passes over all parameters, in logarithms
 _PRIOR_LOG_SD = 1.0  # of each length and of the noise ratio, about their prior values
 _JITTER = 1e-8
 _N_COSINES = 200  # of a prior draw
@@ -133,14 +134,15 @@ class _Likelihood:
         self._n = len(x)
         difference = x.T[:, :, None] - x.T[:, None, :]
         self._half_square = -0.5 * (difference**2).reshape(x.shape[1], -1)  # (dim, n n)
-        self._bordered = np.zeros((self._n + 1, self._n + 1))
+        self._exponent, self._bordered = np.empty(self._n**2), np.zeros((self._n + 1, self._n + 1))
         self._y, self._y_square = y, float(y @ y)
 
     def __call__(self, hyper: Hyper) -> float:
         noise, n, bordered = hyper.noise + _JITTER, self._n, self._bordered
-        exponent = (hyper.lengths**-2.0 @ self._half_square).reshape(n, n)
-        bordered[:n, :n] = np.exp(np.maximum(exponent, _EXPONENT_MIN, out=exponent), out=exponent)
-        bordered.flat[:: n + 2] += noise
+        exponent = np.matmul(hyper.lengths**-2.0, self._half_square, out=self._exponent)
+        np.maximum(exponent, _EXPONENT_MIN, out=exponent)
+        np.exp(exponent.reshape(n, n), out=bordered[:n, :n])
+        bordered.reshape(-1)[:: n + 2] += noise
         bordered[n, :n] = self._y
         bordered[n, n] = 2.0 * self._y_square / noise + 1.0  # above y' (K + g I)^-1 y: the bordered matrix is positive
         factor = np.linalg.cholesky(bordered)
@@ -148,7 +150,9 @@ class _Likelihood:
         return float(-0.5 * n * np.log(variance) - np.log(np.diag(factor)[:n]).sum())
 
 
-def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, noise_min: float = 0.0, n_rounds: int = 3) -> Hyper:
+def fit(
+    x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, noise_min: float = 0.0, follow: bool = False
+) -> Hyper:
     """Hyper-parameters of the largest posterior density, by a deterministic pattern search from `prior` and `start`.
 
     Args:
@@ -157,7 +161,7 @@ def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, noise_min: flo
         prior: Medians of the log-normal priors; its noise must not be below `noise_min`, nor that of `start`.
         start: Where the search begins, if that is better than `prior`.
         noise_min: Smallest noise ratio.
-        n_rounds: Passes over all parameters, each with half the step of the one before.
+        follow: One pass from `start` alone, for data that have grown a little since it was found.
     """
     center = prior.log()
     floor = np.append(np.full(x.shape[1], -np.inf), np.log(noise_min) if noise_min > 0 else -np.inf)
@@ -167,19 +171,19 @@ def fit(x: FloatArray, y: FloatArray, prior: Hyper, start: Hyper, noise_min: flo
         penalty = 0.5 * float(((vector - center) ** 2).sum()) / _PRIOR_LOG_SD**2
         return likelihood(Hyper.from_log(vector)) - penalty
 
-    scored = [(score(vector), vector) for vector in (center, start.log())]
-    best_score, best = max(scored, key=lambda pair: pair[0])
-    step = 0.6
-    for _ in range(n_rounds):
+    candidates = (start.log(),) if follow else (center, start.log())
+    best_score, best = max(((score(vector), vector) for vector in candidates), key=lambda pair: pair[0])
+    for step in _FOLLOW if follow else _SEARCH:
         for axis in range(len(best)):
             for sign in (-1.0, 1.0):
                 trial = best.copy()
                 trial[axis] = max(trial[axis] + sign * step, floor[axis])
+                if trial[axis] == best[axis]:
+                    continue
                 trial_score = score(trial)
                 if trial_score > best_score:
                     best, best_score = trial, trial_score
                     break
-        step /= 2
     return Hyper.from_log(best)
 
 
