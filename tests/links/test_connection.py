@@ -13,6 +13,7 @@ from ivl.errors import ConfigError, LinkError
 from ivl.links.connection import check_uri
 from ivl.links.deadlines import Deadlines
 from ivl.links.tables import LogBlock, Session
+from ivl.silproc import SilProcess
 
 SHORT = Deadlines(connect_s=10.0, answer_s=3.0, retry_s=0.05)
 PARAMS = {"ivl.mass": ("<f", 0.03), "ivl.cut": ("<B", 1), "sil.seed": ("<L", 5), "sil.speed": ("<d", 2.2)}
@@ -81,6 +82,14 @@ def test_error_is_raised_in_time_when_nobody_answers(vehicle: FakeVehicle) -> No
     vehicle.muted = True
     with pytest.raises(LinkError, match=r"no connection within 0\.4 s: nobody answers"):
         Session(vehicle.uri, Deadlines(connect_s=0.4, retry_s=0.05))
+
+
+def test_second_client_is_told_who_flies_the_vehicle(server: SilProcess) -> None:
+    with Session(server.uri, SHORT) as first:
+        with pytest.raises(LinkError, match=r"another client flies it \(Busy: 127\.0\.0\.1:\d+\)"):
+            Session(server.uri, Deadlines(connect_s=0.6, retry_s=0.05))
+        assert first.has_param("ivl.mass")
+        first.ask(15, 0, b"still there", b"still there", "echo")
 
 
 def test_error_is_raised_when_nobody_listens() -> None:

@@ -30,6 +30,7 @@ PING_S = 0.1
 _PINGS_KEPT = 50
 _RETRY_ROUND_TRIPS = 4.0
 _RTT_GAIN = 0.125
+_BUSY = "Busy: "  # a software vehicle says on the console who has it
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,9 @@ class Connection:
 
     def _missing(self) -> str:
         if self.cf.platform.get_protocol_version() < 0:
+            holder = next((line.strip() for line in reversed(list(self.console)) if line.startswith(_BUSY)), "")
+            if holder:
+                return f"another client flies it ({holder}): stop that one first"
             return "nobody answers (is the vehicle switched on, or the software vehicle started?)"
         return "the tables of parameters and log variables did not arrive (bad link)"
 
