@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ivl import native
-from ivl.errors import ConfigError, RolloutError
+from ivl.errors import ConfigError, LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import crazyflie, sil
 from ivl.links.crazyflie import CrazyflieSource
@@ -196,6 +196,28 @@ def test_hovering_vehicle_is_landed(source: CrazyflieSource) -> None:
     field.to_start()
     assert make_safe(vehicle) == "landed, disarmed"
     assert vehicle.position_W_m[2] < 0.1
+
+
+def test_vehicle_is_disarmed_though_its_planner_does_not_answer(
+    source: CrazyflieSource, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    vehicle, asked = vehicle_of(source), []
+
+    def fall_silent() -> None:
+        raise LinkError("no answer")
+
+    def refuse(do: bool) -> bool:
+        asked.append(do)
+        return True
+
+    monkeypatch.setattr(vehicle, "stop_planner", fall_silent)
+    monkeypatch.setattr(vehicle, "arm", refuse)
+    with pytest.raises(LinkError, match="no answer"):
+        make_safe(vehicle)
+    assert asked == [False]
+    monkeypatch.setattr(vehicle, "stop_planner", lambda: None)
+    assert make_safe(vehicle) == "STILL ARMED"
+    monkeypatch.undo()
 
 
 def test_ctrl_c_in_the_air_lands_the_vehicle(server: SilProcess, vertical: Experiment, script: Script) -> None:

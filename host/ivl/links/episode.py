@@ -174,9 +174,10 @@ def make_safe(vehicle: Vehicle) -> str:
     finally:
         # also when a second Ctrl-C ends the above: what is armed by itself again must have nothing to do
         if not vehicle.session.cf.lost:
-            vehicle.stop_planner()
-            vehicle.arm(False)
-            done.append("disarmed")
+            try:
+                vehicle.stop_planner()
+            finally:
+                done.append("STILL ARMED" if vehicle.arm(False) else "disarmed")
     return ", ".join(done)
 
 
