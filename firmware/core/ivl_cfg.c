@@ -6,7 +6,7 @@
 #include "ivl_pwm.h"
 #include "ivl_wire.h"
 
-#define ROW(ctype, group, name, field, unit, min, max, dflt, doc)  ROW_##field,
+#define ROW(ctype, group, name, field, unit, min, max, dflt, doc) ROW_##field,
 #define ENTRY(ctype, group, name, field, unit, min, max, dflt, doc)                                                                        \
     {offsetof(ivl_cfg_t, field), sizeof(ctype), (float)(min), (float)(max), (float)(dflt)},
 
