@@ -255,6 +255,7 @@ def test_policy_is_not_flown_when_the_vehicle_echoes_another(
         assert source.n_discarded == 2
         assert server.get("sil.episode") == 1, "no landing was begun after the one that compares worlds"
     assert any("not in force" in line for line in said)
+    assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"
 
 
 def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess, vertical: Experiment) -> None:
@@ -283,6 +284,7 @@ def test_bounds_beyond_the_vehicle_are_refused_before_the_first_flight(server: S
     chosen = experiment.load("experiments/paper_vertical.yaml", ["policy.rrev_c_per_s.bounds=[0.0, 30.0]"])
     with pytest.raises(RolloutError, match=r"policy bounds: RREV_c 0 \.\. 30"):
         CrazyflieSource(server.uri, chosen)
+    assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"
 
 
 # ---- the run around it

@@ -172,7 +172,14 @@ class CrazyflieSource:
         software = sil.is_sil(session)
         if self.options.mocap is not None:
             self._tracking = Tracking(session, self.options.mocap)
-        vehicle = Vehicle(session, self._make_clock(session, software))
+        clock = self._make_clock(session, software)
+        try:
+            return self._prepare(Vehicle(session, clock), software, again)
+        except BaseException:
+            self._give_back_time(clock)
+            raise
+
+    def _prepare(self, vehicle: Vehicle, software: bool, again: bool) -> Vehicle:
         self._field = self._make_field(vehicle, software)
         if self._is_sil:
             sil.reset(vehicle)
@@ -228,6 +235,8 @@ class CrazyflieSource:
         """
         if not self._is_sil and self._vehicle is not None:
             self.options.say(f"vehicle: {safe_or_why(self._vehicle)}")
+        elif self._vehicle is not None:
+            self._give_back_time(self._vehicle.clock)  # there may be no other attempt
         self._drop()
 
     def _drop(self) -> None:
@@ -244,9 +253,16 @@ class CrazyflieSource:
         try:
             if isinstance(self._field, SilField):
                 self._field.extras.close()
-            vehicle.clock.close()
         except LinkError as error:
             self.options.say(f"not restored: {error}")
+        self._give_back_time(vehicle.clock)
+
+    def _give_back_time(self, clock: Clock) -> None:
+        """Let a software vehicle's time pass again, or it would stand still for whoever comes next."""
+        try:
+            clock.close()
+        except LinkError as error:
+            self.options.say(f"time of the vehicle not restored: {error}")
 
     # ---- journal
 
