@@ -301,7 +301,7 @@ def test_datagrams_of_any_kind_change_nothing_for_a_client(tough, Raw):
         assert tough.get("sil.n_bad") > 500
 
 
-def test_every_length_of_every_packet_is_answered_or_counted(tough, Raw):
+def test_server_answers_on_after_every_length_of_every_packet(tough, Raw):
     with Raw(tough.uri) as client:
         client.connect()
         for port in range(16):
