@@ -59,7 +59,7 @@ def processors() -> int:
 
 
 def _local(workers: int) -> Any:
-    return _dask.LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
+    return _dask.LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0")
 
 
 def _slurm(workers: int | None) -> Any:
