@@ -38,6 +38,7 @@ def main() -> None:
 def measured_table(measured: list[Measured]) -> str:
     """One column for each learner."""
     rows = {
+        "load average before": [f"{m.load_before:.1f}" for m in measured],
         "rollouts/s, one worker": [f"{m.rollouts_per_s_1:,.0f}" for m in measured],
         "rollouts/s, two workers": [f"{m.rollouts_per_s_2:,.0f}" for m in measured],
         "efficiency of two": [f"{100 * m.efficiency:.0f} %" for m in measured],

@@ -1,5 +1,6 @@
 """How fast a sweep is, and what a task costs beside its flights: measured, for `make bench` and docs/SCALING.md."""
 
+import os
 import pickle
 import tempfile
 import time
@@ -21,6 +22,7 @@ class Measured:
 
     Attributes:
         learner: Learner of the sweep.
+        load_before: Programs that wanted a processor in the minute before (load average): other work falsifies rates.
         trials: Trials flown with each number of workers.
         rollouts_per_s_1: Rollouts per second with one worker, learning and storing included.
         rollouts_per_s_2: With two workers.
@@ -33,6 +35,7 @@ class Measured:
     """
 
     learner: str
+    load_before: float
     trials: int
     rollouts_per_s_1: float
     rollouts_per_s_2: float
@@ -55,6 +58,7 @@ def measure(learner: str, n_cells: int = 240) -> Measured:
         learner: Learner by name.
         n_cells: Cells, one trial each.
     """
+    load_before = os.getloadavg()[0]
     settings = ["trials=1", "gears=[wide_long]", f"angles_deg={{first: 20.0, last: 90.0, count: {n_cells // 16}}}"]
     sweep = config.load_sweep("sweeps/paper.yaml", settings, learner=learner)
     with tempfile.TemporaryDirectory() as scratch:
@@ -66,6 +70,7 @@ def measure(learner: str, n_cells: int = 240) -> Measured:
     rates = [result.n_rollouts / result.elapsed_s for result in (one, two)]
     return Measured(
         learner=learner,
+        load_before=load_before,
         trials=one.n_trials,
         rollouts_per_s_1=rates[0],
         rollouts_per_s_2=rates[1],

@@ -70,7 +70,7 @@ def _slurm(workers: int | None) -> Any:
     if workers is None:
         raise ConfigError("--scheduler slurm: say how many workers to ask for with --workers")
     try:
-        cluster = jobqueue.SLURMCluster()
+        cluster = jobqueue.SLURMCluster(scheduler_options={"dashboard_address": ":0"})
     except ValueError as error:
         raise ConfigError(f"--scheduler slurm: jobqueue.slurm in Dask's configuration: {error}") from error
     cluster.scale(workers)
