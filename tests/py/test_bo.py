@@ -38,3 +38,34 @@ def test_caution_prefers_what_is_known() -> None:
         learner.tell(theta, returns(theta))
     nearest = [np.abs(theta - learner.result.recommended).sum(axis=1).min() for learner in (bold, careful)]
     assert nearest[1] <= nearest[0]
+
+
+def test_the_search_spreads_over_the_box_until_a_return_reaches_the_aim() -> None:
+    # a shelf that pays a little, and no more anywhere
+    widths = []
+    for aim in (75.0, 20.0):
+        learner = BOLearner([4.0, 5.0], [1.5, 1.5], bounds=BOUNDS, seed=1, aim=aim)
+        for _ in range(12):
+            theta = learner.ask()
+            learner.tell(theta, np.where(theta[:, 0] > 5.0, 25.0, 5.0))
+        last = learner.ask()
+        widths.append((last[:, 0] < 5.0).sum())
+    assert widths[0] >= 2
+    assert widths[1] == 0
+
+
+def test_farthest_points_keep_away_from_what_is_known_and_from_each_other() -> None:
+    learner = BOLearner([4.0, 5.0], [1.5, 1.5], bounds=BOUNDS, seed=1)
+    low, width = learner._box[0], learner._box[1] - learner._box[0]
+    taken, random = (learner._uniform(n, np.random.default_rng(0)) for n in (30, 6))
+
+    def least_gap(points: np.ndarray) -> float:
+        everything = np.vstack([taken, points]) / width
+        gaps = np.linalg.norm(everything[:, None] - everything, axis=-1)
+        np.fill_diagonal(gaps, np.inf)
+        return float(gaps[len(taken) :].min())
+
+    far = learner._farthest(6, taken)
+    assert ((far >= low) & (far <= low + width)).all()
+    assert least_gap(far) > 2.0 * least_gap(random)
+    assert learner._farthest(0, taken).shape == (0, 2)

@@ -7,6 +7,7 @@ the start's spread, z = (theta - mu0) / sigma0, with y the returns shifted and s
     model             y = f(z) + noise, f a Gaussian process (see `ivl.learners.gp`), refitted after each episode:
                       its lengths and noise ratio are searched up to `settled` rollouts, then followed
     later episodes    theta_n = argmax over the candidates of f_n, f_n a draw of the posterior           (2)
+    before success    while no return has reached `aim`, a share of an episode goes where the box is emptiest
     recommended       argmax(mean(z) - caution sd(z))                                                    (3)
 
 Candidates are uniform in the box and normal about the best remembered policies and the recommended one, spread by a
@@ -14,6 +15,10 @@ share of the kernel's lengths. Draws differ where the returns are uncertain and 
 search turns from exploring to repeating by itself: no spread shrinks by rule, so none collapses on a shelf beside the
 target. The noise ratio has a floor: at the edge of a landing region equal policies end differently, and a model without
 noise explains that by ever shorter lengths, until it takes every lone landing for a peak.
+
+Returns alone lead to the nearest shelf: for many approaches flips that are far too early score better than misses, and
+a landing is a narrow ridge at the shelf's foot. What no return has shown, a model of the returns cannot expect; hence
+`aim`, below which the search does not settle.
 """
 
 from collections.abc import Mapping
@@ -39,6 +44,8 @@ class BOOptions(Options):
     n_near: int = Field(default=300, ge=10, le=5000, description="candidates near what was best")
     n_elite: int = Field(default=20, ge=1, le=1000, description="policies that count as best")
     jitter: float = Field(default=0.25, gt=0, le=10, description="spread of the near candidates, in kernel lengths")
+    aim: float = Field(default=75.0, ge=0, description="return that is worth settling for: a landing with body contact")
+    spread: float = Field(default=0.75, ge=0, le=1, description="share of an episode that explores before that")
     settled: int = Field(default=32, ge=0, le=4000, description="rollouts from which on a fit follows the one before")
     memory: int = Field(default=400, ge=8, le=4000, description="latest rollouts that the model is made from")
 
@@ -70,7 +77,9 @@ class BOLearner(Learner):
         if self._gp is None:
             return draw_truncated(self._rng, self.mu0, self.sigma0, self.lo, self.hi, n)  # (1)
         candidates = self._candidates(self._gp)
-        theta = self._unscale(candidates[self._gp.sample(candidates, n, self._rng).argmax(axis=1)])  # (2)
+        n_far = round(self.options.spread * n) if self._rewards.max() < self.options.aim else 0
+        chosen = candidates[self._gp.sample(candidates, n - n_far, self._rng).argmax(axis=1)]  # (2)
+        theta = self._unscale(np.vstack([chosen, self._farthest(n_far, np.vstack([self._x, chosen]))]))
         self._spread = np.asarray(theta.std(axis=0))
         return theta
 
@@ -99,6 +108,17 @@ class BOLearner(Learner):
         chosen = self._rng.integers(len(centers), size=self.options.n_near)
         near = self._cloud(centers[chosen], self.options.n_near, 1.0, self._rng)
         return np.vstack([uniform, near])
+
+    def _farthest(self, n: int, taken: FloatArray) -> FloatArray:
+        """Points of the box, each as far as can be from all before it; distances in widths of the box."""
+        width = self._box[1] - self._box[0]
+        points = self._uniform(self.options.n_uniform, self._rng) if n else np.empty((0, self.dim))
+        gap = (((points[:, None] - taken) / width) ** 2).sum(axis=-1).min(axis=1, initial=np.inf)
+        far = np.empty((n, self.dim))
+        for i in range(n):
+            far[i] = points[gap.argmax()]
+            gap = np.minimum(gap, (((points - far[i]) / width) ** 2).sum(axis=-1))
+        return far
 
     def _safest(self, gp: GaussianProcess) -> FloatArray:
         """Equation (3).
