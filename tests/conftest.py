@@ -1,0 +1,6 @@
+"""For all tests."""
+
+import signal
+
+# Whoever starts the tests in the background may have told them to ignore Ctrl-C; programs under test would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
