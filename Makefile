@@ -31,7 +31,9 @@ pip     = $(BIN)/python -m pip --disable-pip-version-check install --quiet --con
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
+ifndef SIDE_BY_SIDE
 .NOTPARALLEL:
+endif
 
 ##@ Start here
 
@@ -118,8 +120,13 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 
 ##@ Tests
 
+# longest first; some mostly compute, some mostly wait
+SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-wire test-report test-analysis test-physics sizes-diff
+
 .PHONY: test
-test: lint test-c san golden test-py test-wire test-sil test-links test-physics test-mujoco test-analysis test-sweep test-report pil sizes-diff ## everything below, set-up and compilers included
+test: setup-dev toolchain cross-toolchain chromium qt-libraries lint test-c san golden ## everything below, set-up and compilers included
+	$(say) 'test: the rest, two at a time, each printed when it is over'
+	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 $(SLOW_TESTS)
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
