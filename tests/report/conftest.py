@@ -70,9 +70,8 @@ def sweep_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = tmp_path_factory.mktemp("sweep") / "run"
     worlds = {gear: sweep.make_world(gear) for gear in sweep.gear_names()}
     kept = folder.open_run(run, sweep, worlds, 32, resume=False)
-    library = ivl.native.library().digest()
     for task in plan.plan(sweep, kept.task_size):
-        done = work.run_task(sweep, worlds[task.gear], task, library)
+        done = work.run_task(sweep, worlds[task.gear], task)
         store.write_part(run, task.number, {**done.parts, "tasks": work.record(task, done)})
     kept.close()
     return run
