@@ -120,13 +120,14 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 
 ##@ Tests
 
-# longest first; some mostly compute, some mostly wait
-SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-wire test-report test-analysis test-physics sizes-diff
+# longest first; some mostly compute, some mostly wait; test-wire flies in real time and has the machine for itself
+SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-report test-analysis test-physics sizes-diff
 
 .PHONY: test
 test: setup-dev toolchain cross-toolchain chromium qt-libraries lint test-c san golden ## everything below, set-up and compilers included
 	$(say) 'test: the rest, two at a time, each printed when it is over'
 	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 $(SLOW_TESTS)
+	@+$(MAKE) --no-print-directory test-wire
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
