@@ -35,7 +35,8 @@ def learn(learner: BOLearner, episodes: int, unit: np.ndarray, gain: float = 1.0
 
 def searched(unit: np.ndarray, gain: float = 1.0, seed: int = 3) -> list[np.ndarray]:
     mu0, sigma0 = np.array([4.0, 5.0]) * unit, np.array([1.5, 1.5]) * unit
-    return learn(BOLearner(mu0, sigma0, bounds=BOUNDS * unit[:, None], seed=seed), 4, unit, gain)
+    learner = BOLearner(mu0, sigma0, bounds=BOUNDS * unit[:, None], seed=seed, aim=75.0 * gain)
+    return learn(learner, 4, unit, gain)
 
 
 def test_the_target_beside_the_shelf_is_found_in_nine_of_ten_seeds() -> None:
@@ -52,7 +53,7 @@ def test_the_units_of_the_policy_do_not_matter() -> None:
         assert (plain == scaled).all()
 
 
-def test_the_scale_of_the_returns_does_not_matter() -> None:
+def test_the_scale_of_the_returns_and_of_the_aim_does_not_matter() -> None:
     for plain, scaled in zip(searched(np.ones(2)), searched(np.ones(2), gain=0.25), strict=True):
         assert (plain == scaled).all()
 
