@@ -29,7 +29,6 @@ with SyncCrazyflie(sys.argv[1] if len(sys.argv) > 1 else "udp://127.0.0.1:19850"
     time.sleep(0.5)
     cf.high_level_commander.takeoff(1.0, 2.0)
     time.sleep(3.0)
-    cf.param.set_value("supervisor.tmblChckEn", 0)  # a landing on the ceiling is a tumble to the stock firmware
     cf.appchannel.send_packet(struct.pack("<BBLff", 1, 1, number, 4.8, 0.008))  # flip at RREV 4.8 1/s with 8 N mm
     for n, request in enumerate([1] * 30 + [2] * 50):  # 1: hover, 2: approach, upwards at 2.5 m/s; at least 10 a second
         cf.appchannel.send_packet(struct.pack("<BBHB", 2, 1, n, request) + hover + struct.pack("<ff", 2.5, 1.57))

@@ -7,6 +7,7 @@ event loop, no threads of its own; a gateway is one end of the link of one node.
 import asyncio
 import contextlib
 import time
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,7 +48,7 @@ class Options:
     allow_arming: bool = False
 
 
-class Gateway(asyncio.DatagramProtocol):
+class Gateway(ABC, asyncio.DatagramProtocol):
     """What both ends have in common: a bus, a socket, a clock."""
 
     at_host: bool
@@ -114,11 +115,11 @@ class Gateway(asyncio.DatagramProtocol):
             self.n_packets_in += 1
             self._from_bus(packet, now_s)
 
-    def _from_bus(self, packet: bytes, now_s: float) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def _from_bus(self, packet: bytes, now_s: float) -> None: ...
 
-    async def _tick(self, now_s: float) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    async def _tick(self, now_s: float) -> None: ...
 
     async def _tick_forever(self) -> None:
         while True:

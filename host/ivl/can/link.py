@@ -149,7 +149,7 @@ class CanLink:
     def _check_state(self) -> None:
         try:
             state = self._bus.state
-        except NotImplementedError:
+        except NotImplementedError:  # an interface that cannot tell; error frames are still seen
             return
         if state is not can.BusState.ACTIVE:
             what = "error-passive" if state is can.BusState.PASSIVE else "bus-off"
