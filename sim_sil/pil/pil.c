@@ -129,7 +129,7 @@ static bool send_all(chip_t *chip, const void *bytes, size_t size)
         }
         if (n <= 0)
         {
-            fail_chip(chip, "the emulated chip has ended"); // its end is seen by the write or by the next read, whichever is first
+            fail_chip(chip, "the emulated chip has ended");  // its end is seen by the write or by the next read, whichever is first
             return false;
         }
         at += n;
