@@ -1,6 +1,5 @@
 #include "crtp_faults.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -48,24 +47,29 @@ static void swap(ivl_crtp_datagram_t *a, ivl_crtp_datagram_t *b)
     *b = t;
 }
 
-static void grow(ivl_crtp_faults_t *faults)
+static bool has_room(ivl_crtp_faults_t *faults)
 {
-    const size_t         capacity = (faults->capacity == 0u) ? CAPACITY_FIRST : 2u * faults->capacity;
-    ivl_crtp_datagram_t *queue = realloc(faults->queue, capacity * sizeof *queue);
+    if (faults->n < faults->capacity)
+    {
+        return true;
+    }
+    const size_t         wanted = (faults->capacity == 0u) ? CAPACITY_FIRST : 2u * faults->capacity;
+    ivl_crtp_datagram_t *queue = (wanted <= IVL_CRTP_UNDER_WAY_MAX) ? realloc(faults->queue, wanted * sizeof *queue) : NULL;
     if (queue == NULL)
     {
-        fprintf(stderr, "ivl_sil: out of memory with %zu packets under way\n", faults->n);
-        abort();
+        return false;
     }
     faults->queue = queue;
-    faults->capacity = capacity;
+    faults->capacity = wanted;
+    return true;
 }
 
-static void push(ivl_crtp_faults_t *faults, const ivl_crtp_datagram_t *datagram, uint64_t due_us)
+// a packet for which there is no room is lost, as in a router whose buffer is full
+static bool push(ivl_crtp_faults_t *faults, const ivl_crtp_datagram_t *datagram, uint64_t due_us)
 {
-    if (faults->n == faults->capacity)
+    if (!has_room(faults))
     {
-        grow(faults);
+        return false;
     }
     size_t i = faults->n++;
     faults->queue[i] = *datagram;
@@ -75,6 +79,7 @@ static void push(ivl_crtp_faults_t *faults, const ivl_crtp_datagram_t *datagram,
     {
         swap(&faults->queue[i], &faults->queue[(i - 1u) / 2u]);
     }
+    return true;
 }
 
 static void pop(ivl_crtp_faults_t *faults)
@@ -141,10 +146,12 @@ void ivl_crtp_faults_put(ivl_crtp_faults_t *faults, uint64_t now_us, const ivl_c
     {
         faults->last_due_us[direction] = due_us;
     }
-    push(faults, datagram, due_us);
-    if (u[DRAW_DUPLICATE] < (double)c->duplicate)
+    if (!push(faults, datagram, due_us))
     {
-        push(faults, datagram, due_us);
+        faults->n_lost++;
+    }
+    else if ((u[DRAW_DUPLICATE] < (double)c->duplicate) && push(faults, datagram, due_us))
+    {
         faults->n_duplicated++;
     }
 }

@@ -65,6 +65,10 @@ void ivl_crtp_faults_free(ivl_crtp_faults_t *faults);
 /// Nothing to do for any packet, and none under way.
 bool ivl_crtp_faults_idle(const ivl_crtp_faults_t *faults, uint64_t now_us);
 
+/// Packets under way at most, a power of two: 20 s, the longest delay, at 13,000 packets a second.  Another one is lost, as one is for which
+/// there is no memory.
+#define IVL_CRTP_UNDER_WAY_MAX 262144u
+
 /// Send a packet on its way: 0, 1 or 2 of it will arrive.
 void ivl_crtp_faults_put(ivl_crtp_faults_t *faults, uint64_t now_us, const ivl_crtp_datagram_t *datagram);
 

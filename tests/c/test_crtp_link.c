@@ -137,6 +137,28 @@ static void test_duplicates_are_the_same_packet(void)
     TEST_ASSERT_UINT_WITHIN(80, 400, faults.n_duplicated);
 }
 
+static void test_what_finds_no_room_under_way_is_lost(void)
+{
+    enum
+    {
+        TOO_MANY = 10
+    };
+    faults.cfg.delay_ms = 1.0f;
+    for (unsigned i = 0; i < IVL_CRTP_UNDER_WAY_MAX + TOO_MANY; i++)
+    {
+        const ivl_crtp_datagram_t d = datagram(i);
+        ivl_crtp_faults_put(&faults, 0, &d);
+    }
+    TEST_ASSERT_EQUAL_UINT(TOO_MANY, faults.n_lost);
+    ivl_crtp_datagram_t d;
+    for (unsigned i = 0; i < IVL_CRTP_UNDER_WAY_MAX; i++)
+    {
+        TEST_ASSERT_TRUE(ivl_crtp_faults_take(&faults, 1000, &d));
+        TEST_ASSERT_EQUAL_UINT((uint16_t)i, d.bytes[0] | (d.bytes[1] << 8));
+    }
+    TEST_ASSERT_FALSE(ivl_crtp_faults_take(&faults, 1000, &d));
+}
+
 static void test_the_same_seed_gives_the_same_faults_another_gives_others(void)
 {
     faults.cfg = (ivl_crtp_fault_cfg_t){.loss = 0.1f, .jitter_ms = 20.0f, .reorder = 0.1f, .duplicate = 0.1f, .seed = 3};
@@ -279,6 +301,7 @@ int main(void)
     RUN_TEST(test_delay_and_jitter_keep_the_order);
     RUN_TEST(test_reordering_holds_packets_back);
     RUN_TEST(test_duplicates_are_the_same_packet);
+    RUN_TEST(test_what_finds_no_room_under_way_is_lost);
     RUN_TEST(test_the_same_seed_gives_the_same_faults_another_gives_others);
     RUN_TEST(test_a_cut_loses_all_until_it_ends);
     RUN_TEST(test_the_first_has_the_vehicle_until_he_is_silent);
