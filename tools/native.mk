@@ -61,7 +61,7 @@ FLAGS_tests/c := $(FLAGS_unity) $(FLAGS_sim_sil) -Itests/c -Isim_sil/cf -Itests/
 # the link server, and a vehicle that only writes down what it is told, for its tests
 FLAGS_sim_sil/crtp := $(FLAGS_sim_sil)
 FLAGS_tests/crtp   := $(FLAGS_sim_sil)
-FLAGS_tests/fuzz   := $(FLAGS_sim_sil)
+FLAGS_tests/fuzz   := $(FLAGS_vehicle)
 
 # The fuzzer is guided by the server and the vehicle, not by the physics, which costs time and says little.  Comparisons are followed in the
 # server alone: the vehicle searches its tables by name when it starts.

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cf/cf_vehicle.h"
 #include "crtp/crtp_control.h"
 #include "crtp/crtp_model_file.h"
 #include "crtp/crtp_server.h"
@@ -22,24 +23,24 @@ enum
     STEPS_MAX = 200
 };
 
-static ivl_sim_model_t        *model;
-static ivl_cf_t               *cf;
-static ivl_crtp_t              server, fresh;
-static ivl_crtp_param_state_t *fresh_state;
-static unsigned                n_sent;
-static uint64_t                n_datagrams, n_steps;
+extern uint8_t tumbleCheckEnabled;
 
-// every byte of an answer is looked at, so that one that was never written is seen
+static ivl_sim_model_t *model;
+static ivl_crtp_t       server;
+static unsigned         n_sent;
+static uint64_t         n_inputs, n_datagrams, n_steps;
+static uint64_t         answers, all_answers;
+
+// the bytes of all answers to an input (FNV-1a), and over all inputs a sum that does not depend on their order
 static void look_at(void *context, const ivl_crtp_packet_t *packet)
 {
-    static volatile uint8_t sum;
-    uint8_t                 bytes[IVL_CRTP_BYTES_MAX];
-    const size_t            n = ivl_crtp_bytes(packet, bytes);
+    uint8_t      bytes[IVL_CRTP_BYTES_MAX];
+    const size_t n = ivl_crtp_bytes(packet, bytes);
     (void)context;
     assert((n >= 1u) && (n <= sizeof bytes));
     for (size_t i = 0; i < n; i++)
     {
-        sum = (uint8_t)(sum + bytes[i]);
+        answers = (answers ^ bytes[i]) * 0x100000001b3u;
     }
     n_sent++;
 }
@@ -124,25 +125,58 @@ static void fail(const char *error)
 
 static void tell_counts(void)
 {
-    fprintf(stderr, "fuzz_crtp: %llu datagrams, %llu ms of the vehicle\n", (unsigned long long)n_datagrams, (unsigned long long)n_steps);
+    fprintf(stderr, "fuzz_crtp: %llu inputs, %llu datagrams, %llu ms of the vehicle, answers %016llx\n", (unsigned long long)n_inputs,
+            (unsigned long long)n_datagrams, (unsigned long long)n_steps, (unsigned long long)all_answers);
 }
 
-static void open_vehicle(void)
+// ---- a vehicle that has just booted
+
+static struct
 {
-    char error[200];
-    cf = ivl_cf_open(model, 1, error, sizeof error);
-    if (cf == NULL)
+    ivl_cf_t                cf;
+    app_t                   app;
+    ivl_crtp_t              server;
+    ivl_crtp_param_state_t *params;
+} booted;
+
+static void open_all(void)
+{
+    static const ivl_crtp_host_t HOST = {.send = look_at};
+    char                         error[200];
+    ivl_cf_t *const              cf = ivl_cf_open(model, 1, error, sizeof error);
+    if ((cf == NULL) || !ivl_crtp_open(&server, cf, &HOST, error, sizeof error))
     {
         fail(error);
     }
 }
 
-// The tables are made once, since their making would take most of the time; what an input can change is put back before the next.
+static void keep_booted(void)
+{
+    const size_t n = server.params.toc.n;
+    booted.cf = ivl_cf_the;
+    booted.app = ivl_app;
+    booted.server = server;
+    booted.params = calloc(n, sizeof *booted.params);
+    assert(booted.params != NULL);
+    memcpy(booted.params, server.params.state, n * sizeof *booted.params);
+}
+
+/// The start of the vehicle takes longer than most inputs: it is made once, and all that an input can change is copied back.
+static void boot_again(void)
+{
+    app_task_start();
+    tumbleCheckEnabled = 1;
+    ivl_cf_the = booted.cf;
+    ivl_app = booted.app;
+    server = booted.server;
+    memcpy(server.params.state, booted.params, server.params.toc.n * sizeof *booted.params);
+    ivl_cf_logs_refresh(&ivl_cf_the);
+}
+
 int LLVMFuzzerInitialize(int *argc, char ***argv)
 {
-    static const ivl_crtp_host_t HOST = {.send = look_at};
-    char                         error[400];
-    const char                  *path = getenv("IVL_FUZZ_MODEL");
+    char        error[400];
+    const char *path = getenv("IVL_FUZZ_MODEL");
     (void)argc;
     (void)argv;
     if (path == NULL)
@@ -154,27 +188,19 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
     {
         fail(error);
     }
+    open_all();
+    keep_booted();
     atexit(tell_counts);
-    open_vehicle();
-    if (!ivl_crtp_open(&server, cf, &HOST, error, sizeof error))
-    {
-        fail(error);
-    }
-    fresh = server;
-    fresh_state = calloc(server.params.toc.n, sizeof *fresh_state);
-    assert(fresh_state != NULL);
-    memcpy(fresh_state, server.params.state, server.params.toc.n * sizeof *fresh_state);
     return 0;
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    ivl_cf_close(cf);
-    open_vehicle();
-    server = fresh;
-    server.cf = cf;
-    memcpy(server.params.state, fresh_state, server.params.toc.n * sizeof *fresh_state);
+    boot_again();
+    answers = 0xcbf29ce484222325u;
     ivl_crtp_link(&server, true);
     play(data, size);
+    all_answers += answers;
+    n_inputs++;
     return 0;
 }
