@@ -43,6 +43,7 @@
 
 PACKET(IVL_WIRE_POLICY, policy)
 PACKET(IVL_WIRE_COMMAND, command)
+PACKET(IVL_WIRE_READING, reading)
 PACKET(IVL_WIRE_POLICY_ECHO, policy_echo)
 PACKET(IVL_WIRE_COMMAND_ECHO, command_echo)
 PACKET(IVL_WIRE_CONFIG_ECHO, config_echo)
@@ -76,6 +77,8 @@ const ivl_sil_field_t *ivl_sil_layout(int code, uint32_t *n_fields, uint32_t *it
         return policy(n_fields, item_size);
     case IVL_WIRE_TYPE_COMMAND:
         return command(n_fields, item_size);
+    case IVL_WIRE_TYPE_READING:
+        return reading(n_fields, item_size);
     case IVL_WIRE_TYPE_POLICY_ECHO:
         return policy_echo(n_fields, item_size);
     case IVL_WIRE_TYPE_COMMAND_ECHO:

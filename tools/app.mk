@@ -14,14 +14,14 @@ HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h firmware/
 HOST       := build/app
 HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=all \
               -Wall -Wextra -Wdouble-promotion -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes -Werror \
-              -DSDK_ON_HOST -Ifirmware/core -Ifirmware/app -Itests/app -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
+              -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
 HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) tests/app/sdk_double.c tests/app/test_app.c tests/c/default_fixture.c)
 
 # ---- Cortex-M4F: the SDK's flags, and the one of our Kbuild files
 
 ARM       := build/firmware
 ARM_FLAGS := -Os -Werror -Wall -Wmissing-braces -fno-strict-aliasing -std=gnu11 -fno-math-errno -Wdouble-promotion -ffunction-sections \
-             -fdata-sections -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -g3 -ffp-contract=off -fstack-usage \
+             -fdata-sections -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -g3 -ffp-contract=off -fstack-usage -DCONFIG_ENABLE_CPX=1 \
              -Ifirmware/core -Ifirmware/app -isystem firmware/sdk
 ARM_OBJ   := $(patsubst firmware/%.c,$(ARM)/%.o,$(SOURCES))
 # what the objects may ask of the world: the SDK's functions that firmware/sdk declares, and these of the C library

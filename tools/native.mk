@@ -74,7 +74,7 @@ endif
 BUILD   := build/$(FLAVOUR)
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
 SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/pil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
-CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out %/app_controller.c,$(wildcard firmware/app/*.c)))
+CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out %/app_controller.c %/app_cpx.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
 LIBRARY := host/ivl/_native/libivl_sil.so

@@ -24,6 +24,9 @@ void controllerOutOfTreeInit(void)
         ivl_app.staged = ivl_app.cfg;
         ivl_record_init(&ivl_app.recorder);
         app_memory_register();
+#ifdef CONFIG_ENABLE_CPX
+        app_cpx_start();
+#endif
     }
     controllerPidInit();
     app_start_core(&ivl_app);

@@ -37,6 +37,21 @@ typedef struct
         type        value;                                                                                                                 \
     }
 
+/// Who tells readings of a camera; each writes a mailbox of its own, from a task of its own.
+typedef enum
+{
+    APP_CAMERA_CHANNEL,  ///< the app channel: a companion computer, a bench
+    APP_CAMERA_CPX,      ///< a deck that speaks CPX
+    APP_CAMERAS
+} app_camera_t;
+
+/// One reading of a camera; `t_us` is its sampling instant, as far as the sender knows it.
+typedef struct
+{
+    ivl_reading_t rrev;
+    ivl_reading_t flow;
+} app_seen_t;
+
 typedef enum
 {
     APP_OWNER_STOCK,
@@ -78,6 +93,7 @@ typedef struct
     _Atomic float  p_sigma_m;        ///< written by the app's task
     _Atomic float  range_mm;         ///< of the ranging sensor that faces up, 0 without one; written by the app's task
     float          range_seen_mm;    ///< of the last call
+    app_seen_t     seen;             ///< by a camera, of the latest sampling instant; zero without one
     atomic_bool    motors_bypassed;  ///< written by the app's task
     bool           configured;       ///< a configuration was put in force since the start
 
@@ -95,9 +111,12 @@ typedef struct
     APP_MAILBOX(ivl_policy_t) policy_in;             ///< app to stabilizer
     APP_MAILBOX(ivl_wire_policy_echo_t) policy_out;  ///< stabilizer to app
     APP_MAILBOX(ivl_command_t) command_in;           ///< app to stabilizer
+    APP_MAILBOX(app_seen_t) seen_in[APP_CAMERAS];    ///< app, or the deck's task, to stabilizer
     app_config_result_t config_result;               ///< last one, for logs; written by the app's task
     uint32_t            config_crc;                  ///< of the configuration in force; written by the app's task
     uint32_t            n_bad_packet;                ///< packets that were none of ours; written by the app's task
+    _Atomic uint32_t    n_reading;                   ///< readings of a camera that were passed on; written by the senders' tasks
+    _Atomic uint32_t    n_reading_bad;               ///< and that were refused
     app_pending_t       pending;                     ///< of the app's task
     int                 n_config_polls;              ///< of the app's task: how often a commit was found waiting
 } app_t;
@@ -165,4 +184,18 @@ bool app_packets_waiting(const app_t *app);
 
 /// Answer what has been done or cannot be; once a millisecond while app_packets_waiting, else every few.
 void app_packets_poll(app_t *app);
+
+// ---- readings of a camera (app_reading.c)
+
+/// Check a reading and hand it to the stabilizer's task; counts it as passed on or refused.  In the task of its sender.
+void app_reading_put(app_t *app, app_camera_t camera, const ivl_wire_reading_t *packet, uint64_t now_us);
+
+/// In the stabilizer's task: keep what the cameras have told since the last call, unless it was sampled before what is kept.
+void app_reading_take(app_t *app);
+
+/// In the stabilizer's task: put what is kept into app->in where it was sampled after what stands there.
+void app_reading_show(app_t *app);
+
+/// Listen to a deck that speaks CPX (app_cpx.c).  Once, at the start.
+void app_cpx_start(void);
 #endif  // APP_IVL_H

@@ -5,6 +5,7 @@
 #include "app_ivl.h"
 #include "ivl_cfg_name.h"
 #include "task.h"
+#include "usec_time.h"
 
 #define DEBUG_MODULE "IVL"
 #include "debug.h"
@@ -118,6 +119,7 @@ void app_packets_handle(app_t *app, const uint8_t *bytes, size_t size)
 {
     ivl_wire_policy_t  policy;
     ivl_wire_command_t command;
+    ivl_wire_reading_t reading;
     if (ivl_wire_get_policy(bytes, size, &policy))
     {
         handle_policy(app, &policy);
@@ -125,6 +127,10 @@ void app_packets_handle(app_t *app, const uint8_t *bytes, size_t size)
     else if (ivl_wire_get_command(bytes, size, &command))
     {
         handle_command(app, &command);
+    }
+    else if (ivl_wire_get_reading(bytes, size, &reading))
+    {
+        app_reading_put(app, APP_CAMERA_CHANNEL, &reading, usecTimestamp());
     }
     else
     {

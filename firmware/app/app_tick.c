@@ -43,6 +43,7 @@ void app_take_requests(app_t *app, uint64_t now_us)
         app->t_host_us = now_us;
         app->has_host = true;
     }
+    app_reading_take(app);
 }
 
 void app_look_around(app_t *app, bool stock_idle, float setpoint_age_s, uint64_t now_us)
@@ -67,6 +68,7 @@ void app_look_around(app_t *app, bool stock_idle, float setpoint_age_s, uint64_t
 
 void app_step(app_t *app)
 {
+    app_reading_show(app);
     ivl_step(&app->cfg, &app->state, &app->in, &app->out);
     ivl_record_step(&app->recorder, &app->cfg, &app->state, &app->out);
     app_tumble_check_set(app->state.phase);

@@ -106,4 +106,13 @@ LOG_ADD(LOG_UINT32, cfg_crc, &ivl_app.config_crc)
  * @brief Packets of the app channel that were not understood
  */
 LOG_ADD(LOG_UINT32, n_bad_packet, &ivl_app.n_bad_packet)
+/**
+ * @brief Readings of a camera that were passed on to the core
+ */
+LOG_ADD(LOG_UINT32, n_reading, &ivl_app.n_reading)
+/**
+ * @brief Readings of a camera that were refused: no number, out of range, too old, sooner than a millisecond after the last one, or (over
+ * CPX) not understood
+ */
+LOG_ADD(LOG_UINT32, n_reading_bad, &ivl_app.n_reading_bad)
 LOG_GROUP_STOP(ivl)

@@ -81,6 +81,7 @@ static float f32_of_bits(uint32_t bits)
 
 CODEC(policy, POLICY)
 CODEC(command, COMMAND)
+CODEC(reading, READING)
 CODEC(policy_echo, POLICY_ECHO)
 CODEC(command_echo, COMMAND_ECHO)
 CODEC(config_echo, CONFIG_ECHO)

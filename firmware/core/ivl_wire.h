@@ -34,6 +34,13 @@ typedef float    ivl_f32_t;
     X(f32, speed_mps, "m/s", "used by APPROACH")                                 \
     X(f32, angle_rad, "rad", "used by APPROACH: above the horizontal")
 
+/// Camera to vehicle, type 0x03: what it saw of the ceiling.  Not answered.
+#define IVL_WIRE_READING(X)                                                      \
+    X(u8, valid, "1", "sum of 1: rrev_per_s holds, 2: of_y_radps holds")         \
+    X(f32, age_s, "s", "from the sampling instant to sending")                   \
+    X(f32, rrev_per_s, "1/s", "positive while the ceiling comes closer")         \
+    X(f32, of_y_radps, "rad/s", "OF_y, without the body's rotation")
+
 /// Vehicle to host, type 0x81: answer to 0x01, with what is in force after it.
 #define IVL_WIRE_POLICY_ECHO(X)                                                  \
     X(u32, seq, "1", "number of the packet that is answered")                    \
@@ -63,10 +70,18 @@ typedef enum
 {
     IVL_WIRE_TYPE_POLICY = 0x01,
     IVL_WIRE_TYPE_COMMAND = 0x02,
+    IVL_WIRE_TYPE_READING = 0x03,
     IVL_WIRE_TYPE_POLICY_ECHO = 0x81,
     IVL_WIRE_TYPE_COMMAND_ECHO = 0x82,
     IVL_WIRE_TYPE_CONFIG_ECHO = 0x83
 } ivl_wire_type_t;
+
+/// Bits of a reading's member `valid`.
+typedef enum
+{
+    IVL_WIRE_VALID_RREV = 1,
+    IVL_WIRE_VALID_FLOW = 2
+} ivl_wire_valid_t;
 
 /// Status of an echo: ivl_status_t, and what only a port can say.
 typedef enum
@@ -88,6 +103,10 @@ typedef struct
 } ivl_wire_command_t;
 typedef struct
 {
+    IVL_WIRE_READING(IVL_WIRE_MEMBER)
+} ivl_wire_reading_t;
+typedef struct
+{
     IVL_WIRE_POLICY_ECHO(IVL_WIRE_MEMBER)
 } ivl_wire_policy_echo_t;
 typedef struct
@@ -104,6 +123,7 @@ typedef struct
 /// @return its size
 size_t ivl_wire_put_policy(uint8_t *bytes, const ivl_wire_policy_t *packet);
 size_t ivl_wire_put_command(uint8_t *bytes, const ivl_wire_command_t *packet);
+size_t ivl_wire_put_reading(uint8_t *bytes, const ivl_wire_reading_t *packet);
 size_t ivl_wire_put_policy_echo(uint8_t *bytes, const ivl_wire_policy_echo_t *packet);
 size_t ivl_wire_put_command_echo(uint8_t *bytes, const ivl_wire_command_echo_t *packet);
 size_t ivl_wire_put_config_echo(uint8_t *bytes, const ivl_wire_config_echo_t *packet);
@@ -112,6 +132,7 @@ size_t ivl_wire_put_config_echo(uint8_t *bytes, const ivl_wire_config_echo_t *pa
 /// @return false, and *packet unchanged, unless type, version and size are right
 bool ivl_wire_get_policy(const uint8_t *bytes, size_t size, ivl_wire_policy_t *packet);
 bool ivl_wire_get_command(const uint8_t *bytes, size_t size, ivl_wire_command_t *packet);
+bool ivl_wire_get_reading(const uint8_t *bytes, size_t size, ivl_wire_reading_t *packet);
 bool ivl_wire_get_policy_echo(const uint8_t *bytes, size_t size, ivl_wire_policy_echo_t *packet);
 bool ivl_wire_get_command_echo(const uint8_t *bytes, size_t size, ivl_wire_command_echo_t *packet);
 bool ivl_wire_get_config_echo(const uint8_t *bytes, size_t size, ivl_wire_config_echo_t *packet);

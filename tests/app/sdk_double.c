@@ -23,6 +23,7 @@ uint8_t tumbleCheckEnabled;
 void sdk_double_reset(void)
 {
     sdk = (sdk_t){
+        .cpx_handler = sdk.cpx_handler,
         .now_us = 10000000u,
         .vbat_V = 4.0f,
         .can_fly = true,
@@ -263,6 +264,12 @@ void memoryRegisterHandler(const MemoryHandlerDef_t *handlerDef)
 {
     sdk.memory = handlerDef;
     sdk.n_memory++;
+}
+
+void cpxRegisterAppMessageHandler(cpxAppMessageHandlerCallback_t callback)
+{
+    TEST_ASSERT_NULL(sdk.cpx_handler);
+    sdk.cpx_handler = callback;
 }
 
 void sdk_print(const char *format, ...)

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "cpx.h"
 #include "log.h"
 #include "mem.h"
 #include "param.h"
@@ -44,17 +45,18 @@ typedef struct
     jmp_buf      leave;
 
     // done by the app
-    control_t                 control;
-    stabilizerStep_t          step;
-    int                       n_pid_init, n_pid_null, n_pid;
-    stabilizerStep_t          last_pid_step;
-    int                       n_relax, n_go_to;
-    float                     go_to[5];
-    char                      printed[80];  ///< format of the last line
-    sdk_packet_t              sent[SDK_SENT_MAX];
-    int                       n_sent;
-    const MemoryHandlerDef_t *memory;
-    int                       n_memory;
+    control_t                      control;
+    stabilizerStep_t               step;
+    int                            n_pid_init, n_pid_null, n_pid;
+    stabilizerStep_t               last_pid_step;
+    int                            n_relax, n_go_to;
+    float                          go_to[5];
+    char                           printed[80];  ///< format of the last line
+    sdk_packet_t                   sent[SDK_SENT_MAX];
+    int                            n_sent;
+    cpxAppMessageHandlerCallback_t cpx_handler;  ///< stays when the double is reset, as the SDK's does
+    const MemoryHandlerDef_t      *memory;
+    int                            n_memory;
     void (*each_ms)(void);  ///< hook, called before each step of the stabilizer
 } sdk_t;
 

@@ -584,6 +584,130 @@ static void test_range_out_of_reach_is_told_as_such(void)
     TEST_ASSERT_EQUAL_UINT8(0, ivl_app.in.range.valid);
 }
 
+// ---- readings of a camera
+
+/// From the app channel, or from a deck.
+static void tell_reading(app_camera_t camera, const ivl_wire_reading_t *packet)
+{
+    CPXPacket_t message = {.route = {.source = CPX_T_GAP8, .destination = CPX_T_STM32, .function = CPX_F_APP}};
+    message.dataLength = (uint16_t)ivl_wire_put_reading(message.data, packet);
+    if (camera == APP_CAMERA_CPX)
+    {
+        sdk.cpx_handler(&message);
+    }
+    else
+    {
+        handle(message.data, message.dataLength);
+    }
+}
+
+static void assert_counts(uint32_t n_good, uint32_t n_bad)
+{
+    TEST_ASSERT_EQUAL_UINT32(n_good, (uint32_t)sdk_double_read_log("n_reading"));
+    TEST_ASSERT_EQUAL_UINT32(n_bad, (uint32_t)sdk_double_read_log("n_reading_bad"));
+}
+
+static void test_reading_of_a_camera_reaches_the_core_at_its_sampling_instant(void)
+{
+    for (int camera = 0; camera < APP_CAMERAS; camera++)
+    {
+        start_in_flight();
+        TEST_ASSERT_EQUAL_UINT64(0, ivl_app.in.rrev.t_us);  // no camera, no reading
+        sdk.n_sent = 0;
+        const uint64_t arrival_us = sdk.now_us;
+        tell_reading((app_camera_t)camera, &(ivl_wire_reading_t){3u, 0.0125f, 4.5f, -1.5f});
+        sdk_double_run(2);
+        TEST_ASSERT_EQUAL_UINT64(arrival_us - 12500u, ivl_app.in.rrev.t_us);
+        TEST_ASSERT_EQUAL_UINT64(arrival_us - 12500u, ivl_app.in.flow.t_us);
+        TEST_ASSERT_FLOAT_WITHIN(0.0f, 4.5f, ivl_app.in.rrev.value);
+        TEST_ASSERT_FLOAT_WITHIN(0.0f, -1.5f, ivl_app.in.flow.value);
+        TEST_ASSERT_EQUAL_UINT8(1, ivl_app.in.rrev.valid & ivl_app.in.flow.valid);
+        assert_counts(1, 0);
+        TEST_ASSERT_EQUAL_INT(0, sdk.n_sent);  // a camera waits for no answer
+
+        // the same is told until there is another one; each value is invalid by itself, and is then not looked at
+        sdk_double_run(20);
+        TEST_ASSERT_EQUAL_UINT64(arrival_us - 12500u, ivl_app.in.rrev.t_us);
+        tell_reading((app_camera_t)camera, &(ivl_wire_reading_t){IVL_WIRE_VALID_FLOW, 0.0f, NAN, 2.0f});
+        sdk_double_run(2);
+        TEST_ASSERT_EQUAL_UINT8(0, ivl_app.in.rrev.valid);
+        TEST_ASSERT_EQUAL_UINT8(1, ivl_app.in.flow.valid);
+        TEST_ASSERT_FLOAT_WITHIN(0.0f, 0.0f, ivl_app.in.rrev.value);
+        assert_counts(2, 0);
+    }
+}
+
+static void test_reading_that_is_no_number_out_of_range_or_too_old_is_refused_and_counted(void)
+{
+    const ivl_wire_reading_t bad[] = {
+        {3u, 0.0f, NAN, 0.0f},    {3u, 0.0f, INFINITY, 0.0f}, {3u, 0.0f, 20.1f, 0.0f},    {3u, 0.0f, -20.1f, 0.0f},
+        {3u, 0.0f, 1.0f, NAN},    {3u, 0.0f, 1.0f, -100.5f},  {3u, 0.0f, 1.0f, 100.5f},   {3u, NAN, 1.0f, 0.0f},
+        {3u, -0.01f, 1.0f, 0.0f}, {3u, 0.0601f, 1.0f, 0.0f},  {3u, INFINITY, 1.0f, 0.0f}, {4u, 0.0f, 1.0f, 0.0f},
+    };
+    for (int camera = 0; camera < APP_CAMERAS; camera++)
+    {
+        start_in_flight();
+        tell_reading((app_camera_t)camera, &(ivl_wire_reading_t){3u, 0.0f, 2.0f, 0.5f});
+        sdk_double_run(2);
+        const ivl_in_t before = ivl_app.in;
+        const uint32_t n = (uint32_t)(sizeof bad / sizeof bad[0]);
+        for (uint32_t i = 0; i < n; i++)
+        {
+            tell_reading((app_camera_t)camera, &bad[i]);
+            sdk_double_run(2);
+            assert_counts(1, i + 1u);
+            TEST_ASSERT_EQUAL_MEMORY(&before.rrev, &ivl_app.in.rrev, sizeof before.rrev);
+            TEST_ASSERT_EQUAL_MEMORY(&before.flow, &ivl_app.in.flow, sizeof before.flow);
+        }
+        // one that only becomes too old by what the operator says about the way
+        tell_reading((app_camera_t)camera, &(ivl_wire_reading_t){3u, 0.04f, 1.0f, 0.0f});
+        sdk_double_run(2);
+        assert_counts(2, n);
+        sdk_double_write_float("rrev_delay", 0.03f);
+        TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(2).status);
+        tell_reading((app_camera_t)camera, &(ivl_wire_reading_t){3u, 0.04f, 1.0f, 0.0f});
+        assert_counts(2, n + 1u);
+    }
+}
+
+static void test_reading_that_comes_too_soon_or_was_sampled_before_the_last_one_changes_nothing(void)
+{
+    start_in_flight();
+    tell_reading(APP_CAMERA_CPX, &(ivl_wire_reading_t){3u, 0.0f, 2.0f, 0.5f});
+    tell_reading(APP_CAMERA_CPX, &(ivl_wire_reading_t){3u, 0.0f, 3.0f, 0.5f});
+    assert_counts(1, 1);
+    sdk_double_run(2);
+    TEST_ASSERT_FLOAT_WITHIN(0.0f, 2.0f, ivl_app.in.rrev.value);
+    // two cameras: the later sampling instant counts, whichever comes first
+    tell_reading(APP_CAMERA_CHANNEL, &(ivl_wire_reading_t){3u, 0.05f, 4.0f, 0.5f});
+    sdk_double_run(2);
+    TEST_ASSERT_FLOAT_WITHIN(0.0f, 2.0f, ivl_app.in.rrev.value);
+    tell_reading(APP_CAMERA_CHANNEL, &(ivl_wire_reading_t){3u, 0.001f, 4.0f, 0.5f});
+    sdk_double_run(2);
+    TEST_ASSERT_FLOAT_WITHIN(0.0f, 4.0f, ivl_app.in.rrev.value);
+}
+
+static void test_message_of_a_deck_that_is_no_reading_is_counted_and_commands_nothing(void)
+{
+    start_in_flight();
+    CPXPacket_t              message = {.route = {.source = CPX_T_GAP8, .function = CPX_F_APP}};
+    const ivl_wire_policy_t  policy = {99, 1.0f, 0.001f};
+    const ivl_wire_command_t command = {.seq = 1, .request = IVL_REQUEST_HOVER};
+    sdk.n_sent = 0;
+    message.dataLength = (uint16_t)ivl_wire_put_policy(message.data, &policy);
+    sdk.cpx_handler(&message);
+    message.dataLength = (uint16_t)ivl_wire_put_command(message.data, &command);
+    sdk.cpx_handler(&message);
+    message.dataLength = 0;
+    sdk.cpx_handler(&message);
+    sdk_double_run(20);
+    run_task(3);
+    assert_counts(0, 3);
+    assert_phase(IVL_PHASE_IDLE);
+    TEST_ASSERT_EQUAL_UINT32(11, ivl_app.state.policy.seq);
+    TEST_ASSERT_EQUAL_INT(0, sdk.n_sent);
+}
+
 static void test_motors_driven_past_the_controller_refuse_to_arm(void)
 {
     start_in_flight();
@@ -769,6 +893,10 @@ int main(void)
     RUN_TEST(test_position_that_is_uncertain_or_not_known_to_be_certain_refuses_to_arm);
     RUN_TEST(test_range_that_changes_is_a_new_reading_in_metres);
     RUN_TEST(test_range_out_of_reach_is_told_as_such);
+    RUN_TEST(test_reading_of_a_camera_reaches_the_core_at_its_sampling_instant);
+    RUN_TEST(test_reading_that_is_no_number_out_of_range_or_too_old_is_refused_and_counted);
+    RUN_TEST(test_reading_that_comes_too_soon_or_was_sampled_before_the_last_one_changes_nothing);
+    RUN_TEST(test_message_of_a_deck_that_is_no_reading_is_counted_and_commands_nothing);
     RUN_TEST(test_motors_driven_past_the_controller_refuse_to_arm);
     RUN_TEST(test_nothing_arms_before_a_configuration_is_in_force);
     RUN_TEST(test_policy_is_echoed_as_it_is_in_force);

@@ -21,6 +21,14 @@ static void test_command_has_the_documented_bytes(void)
     TEST_ASSERT_EQUAL_MEMORY(head, bytes, sizeof head);
 }
 
+static void test_reading_has_the_documented_bytes(void)
+{
+    const ivl_wire_reading_t packet = {.valid = 3u, .age_s = 0.5f, .rrev_per_s = 1.0f, .of_y_radps = -2.0f};
+    const uint8_t            expected[] = {0x03, 0x01, 0x03, 0x00, 0x00, 0x00, 0x3f, 0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x00, 0xc0};
+    TEST_ASSERT_EQUAL_UINT64(sizeof expected, ivl_wire_put_reading(bytes, &packet));
+    TEST_ASSERT_EQUAL_MEMORY(expected, bytes, sizeof expected);
+}
+
 #define CHECK_ROUND_TRIP(lower, ...)                                                                                                       \
     do                                                                                                                                     \
     {                                                                                                                                      \
@@ -47,6 +55,7 @@ static void test_packets_survive_the_way_and_refuse_what_is_not_theirs(void)
 {
     CHECK_ROUND_TRIP(policy, .seq = 7, .rrev_c_per_s = 4.8f, .moment_y_Nm = 0.008f);
     CHECK_ROUND_TRIP(command, .seq = 9, .request = 1, .hover_x_m = -1.5f, .hover_y_m = 2.0f, .hover_z_m = 1.0f, .speed_mps = 2.5f);
+    CHECK_ROUND_TRIP(reading, .valid = 1, .age_s = 0.02f, .rrev_per_s = 4.8f, .of_y_radps = -1.5f);
     CHECK_ROUND_TRIP(policy_echo, .seq = 7, .status = -2, .seq_in_force = 6, .rrev_c_per_s = 3.0f, .moment_y_Nm = 0.01f);
     CHECK_ROUND_TRIP(command_echo, .seq = 65535, .status = -1, .request = 3, .phase = 7, .rule = 11, .cause = 12);
     CHECK_ROUND_TRIP(config_echo, .seq = 1, .status = -3, .bad = 255, .crc = 0xdeadbeefu);
@@ -84,12 +93,13 @@ static void test_random_bytes_are_accepted_only_with_type_version_and_size(void)
         noise[1] = (uint8_t)(noise[1] & 0x01u);
         ivl_wire_policy_t       policy;
         ivl_wire_command_t      command;
+        ivl_wire_reading_t      reading;
         ivl_wire_policy_echo_t  policy_echo;
         ivl_wire_command_echo_t command_echo;
         ivl_wire_config_echo_t  config_echo;
         const int n = ivl_wire_get_policy(noise, size, &policy) + ivl_wire_get_command(noise, size, &command) +
-                      ivl_wire_get_policy_echo(noise, size, &policy_echo) + ivl_wire_get_command_echo(noise, size, &command_echo) +
-                      ivl_wire_get_config_echo(noise, size, &config_echo);
+                      ivl_wire_get_reading(noise, size, &reading) + ivl_wire_get_policy_echo(noise, size, &policy_echo) +
+                      ivl_wire_get_command_echo(noise, size, &command_echo) + ivl_wire_get_config_echo(noise, size, &config_echo);
         TEST_ASSERT_TRUE(n <= 1);
         TEST_ASSERT_TRUE((n == 0) || ((noise[1] == 1u) && (size >= 9u)));
         n_accepted += (uint32_t)n;
@@ -102,6 +112,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_policy_has_the_documented_bytes);
     RUN_TEST(test_command_has_the_documented_bytes);
+    RUN_TEST(test_reading_has_the_documented_bytes);
     RUN_TEST(test_packets_survive_the_way_and_refuse_what_is_not_theirs);
     RUN_TEST(test_values_that_are_no_numbers_pass_through);
     RUN_TEST(test_crc_has_the_value_that_zip_files_have);

@@ -20,6 +20,7 @@ VALUES = {
         "seq": 65535, "request": 2, "hover_x_m": -0.25, "hover_y_m": 1.5, "hover_z_m": 0.7, "speed_mps": 2.2,
         "angle_rad": math.radians(60.3),
     },
+    PacketType.READING: {"valid": 3, "age_s": 0.02, "rrev_per_s": 4.8, "of_y_radps": -math.inf},
     PacketType.POLICY_ECHO: {
         "seq": 7, "status": -2, "seq_in_force": 6, "rrev_c_per_s": math.inf, "moment_y_Nm": -1.5,
     },

@@ -26,6 +26,7 @@ class PacketType(IntEnum):
 
     POLICY = 0x01
     COMMAND = 0x02
+    READING = 0x03
     POLICY_ECHO = 0x81
     COMMAND_ECHO = 0x82
     CONFIG_ECHO = 0x83
@@ -102,6 +103,14 @@ def encode(kind: PacketType, **values: float) -> bytes:
             raise ValueError(f"{kind.name}: {name}: value {value!r} does not fit into {dtype[name]}") from error
     head = bytes((kind, native.library().wire_version()))
     return head + record.tobytes()[len(head) :]
+
+
+def encode_reading(rrev_per_s: float | None, of_y_radps: float | None = None, age_s: float = 0.0) -> bytes:
+    """Bytes of READING: what a camera saw of the ceiling, `age_s` ago; None stands for what it did not see."""
+    valid = (rrev_per_s is not None) + 2 * (of_y_radps is not None)
+    return encode(
+        PacketType.READING, valid=valid, age_s=age_s, rrev_per_s=rrev_per_s or 0.0, of_y_radps=of_y_radps or 0.0
+    )
 
 
 def decode(data: bytes) -> Packet | None:

@@ -27,6 +27,7 @@ from ivl.links.packets import (
     Status,
     decode,
     encode,
+    encode_reading,
 )
 from ivl.links.tables import LogBlock, Session
 from ivl.world import World
@@ -179,6 +180,10 @@ class Vehicle:
         )  # fmt: skip
         self.session.send(_PORT_PLATFORM, _APP, data)
         return self._seq
+
+    def tell_reading(self, rrev_per_s: float | None, of_y_radps: float | None = None, age_s: float = 0.0) -> None:
+        """Tell what a camera saw, as `packets.encode_reading`; the vehicle does not answer."""
+        self.session.send(_PORT_PLATFORM, _APP, encode_reading(rrev_per_s, of_y_radps, age_s))
 
     def begin_flight(self) -> None:
         """Forget how the last flight was aborted."""

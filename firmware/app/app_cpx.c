@@ -1,0 +1,24 @@
+/// @file app_cpx.c
+/// Readings of a camera from a deck that speaks CPX, such as the AI-deck: the app channel's packet as a message for the function APP.
+/// Part of the drone's build alone, where the SDK has CPX.  The handler runs in the task of CPX.
+#include "app_ivl.h"
+#include "cpx.h"
+#include "usec_time.h"
+
+static void on_message(const CPXPacket_t *message)
+{
+    ivl_wire_reading_t packet;
+    if (ivl_wire_get_reading(message->data, message->dataLength, &packet))
+    {
+        app_reading_put(&ivl_app, APP_CAMERA_CPX, &packet, usecTimestamp());
+    }
+    else
+    {
+        atomic_fetch_add(&ivl_app.n_reading_bad, 1u);
+    }
+}
+
+void app_cpx_start(void)
+{
+    cpxRegisterAppMessageHandler(on_message);
+}
