@@ -227,6 +227,8 @@ def apply_setting(data: dict[str, Any], setting: str) -> None:
         data["overrides"][name] = {"value": checked, "unit": table[name].unit, "source": "set on the command line"}
         return
     *parents, last = name.split(".")
+    if parents and parents[0] not in data and any(known.startswith(f"{parents[0]}.") for known in table):
+        model.check_override(name, value)  # a slip in the name of a parameter, which this refuses with advice
     target = data
     for key in parents:
         target = target.setdefault(key, {})

@@ -10,11 +10,16 @@ from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from ivl.errors import ConfigError
 
 Model = TypeVar("Model", bound=BaseModel)
 _NUMBER_AS_TEXT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_N_TOLD = 3
+"""So many problems are told; the others are counted."""
+_N_SHOWN = 60
+"""So many characters of a value are shown."""
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -66,12 +71,14 @@ def validate(model: type[Model], data: Any, label: str) -> Model:
 
 
 def explain(error: ValidationError) -> str:
-    """The first problem as `field: value ...: what is wrong`, with the number of further ones."""
-    problems = error.errors(include_url=False)
-    first = problems[0]
-    field = ".".join(str(part) for part in first["loc"]) or "file"
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return f"{field}: {_complaint(first['type'], first['msg'], first['input'])}{more}"
+    """The first problems as `field: value ...: what is wrong`, with the number of further ones.
+
+    Unknown keys come first: a name with a slip in it is what makes the right one missing.
+    """
+    problems = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+    told = "; ".join(_complaint(problem) for problem in problems[:_N_TOLD])
+    more = f" (and {len(problems) - _N_TOLD} more)" if len(problems) > _N_TOLD else ""
+    return told + more
 
 
 def number_hint(value: Any) -> str:
@@ -81,9 +88,20 @@ def number_hint(value: Any) -> str:
     return ""
 
 
-def _complaint(kind: str, message: str, value: Any) -> str:
+def _complaint(problem: ErrorDetails) -> str:
+    """One problem; one of the model as a whole has no field of its own and names the field in its message."""
+    kind, value, message = problem["type"], problem["input"], problem["msg"].removeprefix("Value error, ")
+    field = ".".join(str(part) for part in problem["loc"])
+    if not field:
+        return message
     if kind == "missing":
-        return "is missing"
+        return f"{field}: is missing"
     if kind == "extra_forbidden":
-        return f"unknown key (value {value!r})"
-    return f"value {value!r}: {message}{number_hint(value)}"
+        return f"{field}: unknown key (value {_short(value)})"
+    return f"{field}: value {_short(value)}: {message}{number_hint(value)}"
+
+
+def _short(value: Any) -> str:
+    """A value as people wrote it, cut where it would hide the rest of the line."""
+    text = repr(value)
+    return text if len(text) <= _N_SHOWN else f"{text[:_N_SHOWN]}..."

@@ -127,3 +127,6 @@ def test_a_folder_without_a_sweep_is_refused(tmp_path: Path, capsys: pytest.Capt
         campaign.load([tmp_path])
     assert run(["figs", str(tmp_path)]) == 1
     assert "holds no sweep" in capsys.readouterr().err
+    (tmp_path / "manifest.json").write_text(json.dumps({"schema_version": schema.SCHEMA_VERSION, "map": {}}))
+    with pytest.raises(ConfigError, match="is a policy map"):
+        campaign.load([tmp_path])

@@ -186,6 +186,7 @@ def test_equal_commands_give_equal_results(capsys: Capture, small_file: Path) ->
         (["SMALL", "--learner", "sgd"], "no learner 'sgd'"),
         (["SMALL", "--set", "speed_mps=-1"], "small.yaml: speed_mps: value -1"),
         (["SMALL", "--set", "colour=red"], "small.yaml: colour: unknown key"),
+        (["SMALL", "--set", "leg.stiffnes=3"], "leg.stiffnes: unknown parameter, did you mean 'leg.stiffness'?"),
         (["SMALL", "--trials", "0"], "--trials"),
         (["--resume", "--out", "x", "--seed", "1"], "--resume without EXPERIMENT takes all from the run folder"),
     ],
@@ -311,6 +312,7 @@ def test_help_teaches_with_examples(capsys: Capture, command: str) -> None:
 def test_help_lists_the_commands(capsys: Capture) -> None:
     text = ok(["--help"], capsys)
     assert all(command in text for command in ("learn", "rollout", "list", "bench"))
+    assert "..." not in text.split("Commands:")[1]  # every line says what it has to say
 
 
 def test_without_a_command_the_help_is_shown_and_nothing_succeeds(capsys: Capture) -> None:
@@ -320,6 +322,11 @@ def test_without_a_command_the_help_is_shown_and_nothing_succeeds(capsys: Captur
 
 def test_an_unknown_command_is_refused(capsys: Capture) -> None:
     assert "flie" in refused(["flie"], capsys)
+
+
+def test_wrong_usage_points_to_the_help_of_its_command(capsys: Capture) -> None:
+    assert refused(["list", "wheels"], capsys).startswith("ivl: Invalid value for 'kind': 'wheels' is not one of")
+    assert "(try `ivl list --help`)" in refused(["list", "wheels"], capsys)
 
 
 def test_the_program_exits_with_the_code_of_its_command() -> None:

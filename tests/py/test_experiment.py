@@ -122,7 +122,7 @@ def test_a_setting_changes_one_field(small_file: Path, setting: str, read: Calla
         ("=3", "expected name=value"),
         ("speed_mps=1e-6", "write numbers as 1.0e-6"),
         ("sense.latency=1", "override: sense.latency: value 1.0 is out of range (allowed 0 .. 0.1 s)"),
-        ("sense.latncy=0.01", "sense: unknown key"),
+        ("sense.latncy=0.01", "sense.latncy: unknown parameter, did you mean 'sense.latency'?"),
         ("speed_mps.x=1", "speed_mps is a value"),
         ("speed_mps=[", "--set speed_mps=["),
     ],

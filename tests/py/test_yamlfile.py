@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, field_validator, model_validator
 
 from ivl import yamlfile
 from ivl.errors import ConfigError
@@ -13,6 +13,19 @@ class Sample(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
     size: float
     name: str = "x"
+
+    @field_validator("size")
+    @classmethod
+    def _positive(cls, size: float) -> float:
+        if not size > 0:
+            raise ValueError("must be positive")
+        return size
+
+    @model_validator(mode="after")
+    def _fit(self) -> "Sample":
+        if self.name == "tiny" and self.size > 1:
+            raise ValueError("size and name do not fit")
+        return self
 
 
 def test_parse_names_line_and_column_when_a_key_is_given_twice() -> None:
@@ -52,7 +65,13 @@ def test_validate_explains_a_number_that_yaml_reads_as_text() -> None:
         ({"size": True}, "f: size: value True: "),
         ({"size": 1.0, "colour": "red"}, "f: colour: unknown key (value 'red')"),
         ([1], "f: expected a mapping of fields, got list"),
-        ({"size": "big", "name": 3}, "(and 1 more)"),
+        ({"size": "big", "name": 3}, "f: size: value 'big': "),
+        ({"size": "big", "name": 3}, "; name: value 3: "),
+        ({"colour": "red"}, "f: colour: unknown key (value 'red'); size: is missing"),
+        ({"size": 1.0, **dict.fromkeys("abcd")}, "c: unknown key (value None) (and 1 more)"),
+        ({"size": 1.0, "colour": "r" * 200}, f"colour: unknown key (value '{'r' * 59}...)"),
+        ({"size": -1.0}, "f: size: value -1.0: must be positive"),
+        ({"size": 2.0, "name": "tiny"}, "f: size and name do not fit"),
     ],
 )
 def test_validate_says_what_is_wrong_in_one_line(data: object, message: str) -> None:

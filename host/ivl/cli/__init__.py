@@ -1,4 +1,4 @@
-"""The command line: `ivl learn`, `ivl rollout`, `ivl list`, `ivl bench`, `ivl flash`.
+"""The command line, one module a command.
 
 Exit codes: 0 success, 1 the work failed, 2 wrong usage or configuration, 130 interrupted.
 """
@@ -34,22 +34,24 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-app.command("learn", help=learn.HELP)(learn.learn)
+app.command("learn", help=learn.HELP, short_help="Learn to land, and judge what was learned.")(learn.learn)
 app.command("rollout", help=rollout.HELP)(rollout.rollout)
+app.command("sweep", help=sweep.HELP, short_help="Learn over a grid of approaches and landing gears.")(sweep.sweep)
+app.command("map", help=sweep.MAP_HELP, short_help="Fly a grid of flips without learning.")(sweep.map_)
+app.command("report", help=report.HELP, short_help="Write the page of a run, to explore and to mail.")(report.report)
+app.command("figs", help=figs.HELP, short_help="Draw the paper's figures 4 to 9 from a campaign.")(figs.figs)
+app.command("export", help=export.HELP, short_help="Write a landing as MCAP, CSV or .rrd.")(export.export)
+app.command("estimate", help=estimate.HELP, short_help="Show how well the core knows its distance.")(estimate.estimate)
 app.command("list", help=listing.HELP)(listing.list_)
 app.command("bench", help=bench.HELP)(bench.bench)
-app.command("flash", help=flash.HELP)(flash.flash)
 app.command("sil", help=sil.HELP)(sil.sil)
-app.command("doctor", help=doctor.HELP)(doctor.doctor)
-app.command("fly", help=fly.HELP)(fly.fly)
-app.command("mocap", help=mocap.HELP)(mocap.mocap)
-app.command("can-gateway", help=can_gateway.HELP)(can_gateway.can_gateway)
-app.command("sweep", help=sweep.HELP)(sweep.sweep)
-app.command("map", help=sweep.MAP_HELP)(sweep.map_)
-app.command("report", help=report.HELP)(report.report)
-app.command("figs", help=figs.HELP)(figs.figs)
-app.command("estimate", help=estimate.HELP)(estimate.estimate)
-app.command("export", help=export.HELP)(export.export)
+app.command("fly", help=fly.HELP, short_help="Fly one landing with a vehicle.")(fly.fly)
+app.command("doctor", help=doctor.HELP, short_help="Check a vehicle before it flies.")(doctor.doctor)
+app.command("mocap", help=mocap.HELP, short_help="Watch a motion-capture system.")(mocap.mocap)
+app.command("can-gateway", help=can_gateway.HELP, short_help="Carry the link of a vehicle over a CAN bus.")(
+    can_gateway.can_gateway
+)
+app.command("flash", help=flash.HELP)(flash.flash)
 
 
 def run(arguments: list[str] | None = None) -> int:
@@ -66,7 +68,9 @@ def run(arguments: list[str] | None = None) -> int:
     except IvlError as error:
         return _fail(str(error), 1)
     except typer.TyperException as error:
-        return _fail(f"{error.format_message()} (try `ivl --help`)", 2)
+        context = getattr(error, "ctx", None)
+        command = context.command_path if context else "ivl"
+        return _fail(f"{error.format_message().replace('Value error, ', '')} (try `{command} --help`)", 2)
     except (KeyboardInterrupt, typer.Abort):
         return 130
 

@@ -39,9 +39,18 @@ def report(
     except ModuleNotFoundError as error:
         raise IvlError(f"{error.name} is not installed: pip install 'ivl[report,sweep]'") from error
     columns = (TextColumn("flying landings again"), BarColumn(), MofNCompleteColumn())
-    with Progress(*columns, console=console.err, transient=True) as progress:
-        task = progress.add_task("", total=None)
-        made = reports.write(run, out, landings, lambda done, n: progress.update(task, completed=done, total=n))
+    progress = Progress(*columns, console=console.err, transient=True)
+    task = progress.add_task("", total=None)
+
+    def on_landing(done: int, n: int) -> None:
+        progress.start()
+        progress.update(task, completed=done, total=n)
+
+    try:
+        made = reports.write(run, out, landings, on_landing)
+    finally:
+        if progress.live.is_started:
+            progress.stop()
     if made.n_different:
         console.err.print(
             f"{made.n_different} of {made.n_landings} landings differ from what the run recorded: "

@@ -113,9 +113,8 @@ def _run(
         _print(summary.of_plan(grid, size), as_json)
         return 0
     run_folder = out or campaign.numbered_folder(base, resume)
-    console.err.print(f"run folder: {run_folder}", highlight=False, soft_wrap=True)
     try:
-        with _progress() as on_standing:
+        with _progress(run_folder) as on_standing:
             result = engine.run(
                 grid, run_folder, resume=resume, scheduler=scheduler, workers=workers, task_size=task_size,
                 on_standing=on_standing,
@@ -133,8 +132,8 @@ def _run(
 
 
 @contextmanager
-def _progress() -> Iterator[Callable[[Any], None]]:
-    """A bar on stderr, and the function that moves it."""
+def _progress(run_folder: Path) -> Iterator[Callable[[Any], None]]:
+    """The folder and a bar on stderr once there is something to tell, and the function that moves the bar."""
     columns = (
         BarColumn(),
         TaskProgressColumn(),
@@ -143,15 +142,20 @@ def _progress() -> Iterator[Callable[[Any], None]]:
         TextColumn("{task.fields[rate]}"),
         TextColumn("{task.fields[left]}"),
     )
-    with Progress(*columns, console=console.err) as bar:
-        row = bar.add_task("", total=None, rate="starting workers", left="")
+    bar = Progress(*columns, console=console.err)
+    row = bar.add_task("", total=None, rate="starting workers", left="")
 
-        def move(standing: Any) -> None:
-            bar.update(
-                row, total=standing.n_trials, completed=standing.n_done, rate=_rate(standing), left=_left(standing)
-            )
+    def move(standing: Any) -> None:
+        if not bar.live.is_started:
+            console.err.print(f"run folder: {run_folder}", highlight=False, soft_wrap=True)
+            bar.start()
+        bar.update(row, total=standing.n_trials, completed=standing.n_done, rate=_rate(standing), left=_left(standing))
 
+    try:
         yield move
+    finally:
+        if bar.live.is_started:
+            bar.stop()
 
 
 def _rate(standing: Any) -> str:
@@ -179,5 +183,15 @@ def _print(report: dict[str, Any], as_json: bool) -> None:
         console.print_json(report)
         return
     for name, value in report.items():
-        text = ", ".join(map(str, value)) if isinstance(value, list) else value
-        console.out.print(f"{name.replace('_', ' '):32s} {text}", highlight=False, soft_wrap=True)
+        console.out.print(f"{name.replace('_', ' '):34s} {_text(value)}", highlight=False, soft_wrap=True)
+
+
+def _text(value: Any) -> str:
+    """A value of the report for people."""
+    if value is None:
+        return "-"
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {each}" for name, each in value.items())
+    return str(value)

@@ -86,11 +86,12 @@ def load(runs: Sequence[Path]) -> Campaign:
 
     Raises:
         StoreError: One holds no sweep.
-        ConfigError: One holds no finished trial.
+        ConfigError: One is a policy map, or holds no finished trial.
     """
     trials, episodes = [], []
     for run in runs:
-        store.read_manifest(run)
+        if "sweep" not in store.read_manifest(run):
+            raise ConfigError(f"{run}: is a policy map; figures are drawn of runs of `ivl sweep`")
         trials.append(_plain(store.read_trials(run)))
         episodes.append(_plain(store.read_episodes(run)))
         if trials[-1].empty:
