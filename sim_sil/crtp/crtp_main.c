@@ -37,12 +37,19 @@ static void on_signal(int number)
     stop = 1;
 }
 
+static void on_child(int number)
+{
+    (void)number;  // caught so that it ends a wait
+}
+
 static void catch_signals(void)
 {
     struct sigaction action = {.sa_handler = on_signal};
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    action.sa_handler = on_child;
+    sigaction(SIGCHLD, &action, NULL);
 }
 
 static bool fail(const char *error)
@@ -129,12 +136,14 @@ static void die_with_parent(pid_t parent)
     }
 }
 
-static bool start(const ivl_crtp_options_t *o, const ivl_sim_model_t *model, unsigned n, const endpoint_t *e, pid_t *child)
+static bool start(const ivl_crtp_options_t *o, const ivl_sim_model_t *model, unsigned n, const endpoint_t *e, const sigset_t *mask,
+                  pid_t *child)
 {
     const pid_t parent = getpid();
     *child = fork();
     if (*child == 0)
     {
+        sigprocmask(SIG_SETMASK, mask, NULL);
         die_with_parent(parent);
         _exit(fly(o, model, n, &e[n]));
     }
@@ -152,18 +161,23 @@ static void stop_all(const pid_t *children, unsigned n)
     }
 }
 
-// ends when it is told to, or when one vehicle has ended by itself: then with all
-static int watch(pid_t *children, unsigned n)
+// Ends when it is told to, or when one vehicle has ended by itself: then with all.  Signals are blocked but in sigsuspend, so that none
+// comes between a look and the wait.
+static int watch(pid_t *children, unsigned n, const sigset_t *mask)
 {
     int      code = 0;
     unsigned n_left = n;
     while (n_left > 0u)
     {
         int         status;
-        const pid_t ended = waitpid(-1, &status, 0);
-        if ((ended < 0) && (errno != EINTR))
+        const pid_t ended = waitpid(-1, &status, WNOHANG);
+        if (ended < 0)
         {
             break;
+        }
+        if (ended == 0)
+        {
+            sigsuspend(mask);
         }
         for (unsigned i = 0; (ended > 0) && (i < n); i++)
         {
@@ -189,21 +203,27 @@ static int watch(pid_t *children, unsigned n)
 
 static int fly_all(const ivl_crtp_options_t *o, const ivl_sim_model_t *model, const endpoint_t *endpoints)
 {
-    pid_t children[VEHICLES_MAX] = {0};
+    pid_t    children[VEHICLES_MAX] = {0};
+    sigset_t held, mask;
     if (o->vehicles == 1u)
     {
         return fly(o, model, 0, endpoints);
     }
+    sigemptyset(&held);
+    sigaddset(&held, SIGINT);
+    sigaddset(&held, SIGTERM);
+    sigaddset(&held, SIGCHLD);
+    sigprocmask(SIG_BLOCK, &held, &mask);
     for (unsigned i = 0; i < o->vehicles; i++)
     {
-        if (!start(o, model, i, endpoints, &children[i]))
+        if (!start(o, model, i, endpoints, &mask, &children[i]))
         {
             stop = 1;
             stop_all(children, i);
             return 1;
         }
     }
-    return watch(children, o->vehicles);
+    return watch(children, o->vehicles, &mask);
 }
 
 int main(int argc, char **argv)
