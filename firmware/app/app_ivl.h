@@ -2,8 +2,9 @@
 /// The app's memory, and what its files ask of each other.
 ///
 /// Four tasks meet here.  The stabilizer (priority 5, 1 kHz) runs the controller hooks, the core and the recorder, and never waits.
-/// PARAM (priority 1) writes `staged`.  The app's own task (priority 1) talks to the host, that of CPX (priority 1) to a deck.  They pass whole values through mailboxes: whoever
-/// fills one waits until it is empty, and a reader that is faster than the writer finds it either full or empty, never half filled.
+/// PARAM (priority 1) writes `staged`.  The app's own task (priority 1) talks to the host, that of CPX (priority 1) to a deck.  They pass
+/// whole values through mailboxes: whoever fills one waits until it is empty, or gives up, and a reader that is faster than the writer finds
+/// it either full or empty, never half filled.
 #ifndef APP_IVL_H
 #define APP_IVL_H
 #include <stdatomic.h>
