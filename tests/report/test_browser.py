@@ -7,6 +7,7 @@ import pytest
 
 import ivl
 from ivl.landing import LandingSpec
+from ivl.plots.campaign import RATE_MAP
 
 Visit = Any  # of conftest.py
 INSIDE = """(path) => {
@@ -126,6 +127,40 @@ def test_a_click_on_a_polar_plot_opens_the_cell(sweep: Visit) -> None:
         assert sweep.page.locator("#trials-table tbody tr").count() == 2
     assert len(titles) == len(landings) == 12
     assert sweep.complaints == []
+
+
+def test_the_page_begins_with_the_best_cell_nearest_to_the_middle(sweep: Visit) -> None:
+    first = sweep.page.evaluate("report.view.firstShown()")
+    cells = sweep.page.evaluate("report.view.cells")
+    best = [cell for cell in cells if cell["rate"] == max(c["rate"] for c in cells)]
+    off = [abs(cell["speed"] / 2 - 0.5) + abs(cell["angle"] / 3 - 0.5) for cell in best]
+    assert first["id"] == best[int(np.argmin(off))]["id"]
+
+
+@pytest.mark.parametrize("leg_length_m", [0.05, 0.1, 0.15])
+def test_feet_and_ceiling_are_in_view_whatever_the_legs_and_the_distance(sweep: Visit, leg_length_m: float) -> None:
+    script = """([leg, d]) => {
+        const state = { pose: { p: [0, 0, -d] } }, view = { azimuth: -0.35, elevation: -0.2, zoom: 1 };
+        const camera = makeCamera(view, { leg_length: leg }, state, 500, 390);
+        return [camera.project([0, 0, -d - 0.005 - leg])[1], camera.project([0, 0, 0])[1]];
+    }"""  # a foot straight below the body, its hip 5 mm below the middle
+    for d_m in (0.06, 0.2, 0.5, 0.9):
+        foot, ceiling = sweep.page.evaluate(script, [leg_length_m, d_m])
+        assert 0 < ceiling < foot < 390
+
+
+def test_rates_have_the_colours_of_the_figures(sweep: Visit) -> None:
+    scale = sweep.page.evaluate(
+        "(() => { const axis = document.querySelector('#polar-plot').layout.coloraxis; "
+        "return [axis.colorscale, axis.reversescale]; })()"
+    )
+    name = scale[0].lower() + ("_r" if scale[1] else "")
+    assert name == RATE_MAP
+
+
+def test_what_is_told_of_the_sensed_distance_is_the_world_s(sweep: Visit) -> None:
+    offset_m = ivl.World(gear_set="as_simulated").params.values["world.sensed_gap_offset"]
+    assert f"a plane {1000 * offset_m:.0f} mm behind the ceiling" in sweep.page.locator("#offset").inner_text()
 
 
 def test_menus_open_a_cell_without_a_mouse(sweep: Visit) -> None:

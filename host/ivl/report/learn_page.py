@@ -14,7 +14,7 @@ from ivl.outcome import four_leg
 from ivl.plots.convergence import outcome_classes
 from ivl.report import replay
 from ivl.report.landings import Album, thinned
-from ivl.report.page import encode, flatten
+from ivl.report.page import encode, flatten, learner_words
 from ivl.store import SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest
 
 
@@ -83,7 +83,10 @@ def _notable(rollouts: RolloutRows, scored: Any) -> list[tuple[str, int]]:
     touched = np.isfinite(rollouts.outcomes["t_impact_s"][scored])
     found = [("best return", int(scored[np.argmax(reward)]))]
     if landed.any():
-        found += [("first on four legs", int(scored[landed][0])), ("last on four legs", int(scored[landed][-1]))]
+        found += [
+            ("first on three or four legs", int(scored[landed][0])),
+            ("last on three or four legs", int(scored[landed][-1])),
+        ]
     found.append(("last rollout", int(scored[-1])))
     if touched.any():
         found.append(("worst that touched the ceiling", int(scored[touched][np.argmin(reward[touched])])))
@@ -94,7 +97,7 @@ def _facts(experiment: Experiment, n_trials: int, folder: Path) -> list[list[str
     facts = [
         ["Vehicle and gear", f"{experiment.vehicle}, {experiment.gear_set}/{experiment.gear}"],
         ["Approach", f"{experiment.speed_mps:g} m/s at {experiment.angle_deg:g}°"],
-        ["Learner", experiment.learner.name],
+        ["Learner", learner_words(experiment.learner.name)],
         ["Rollouts", f"{experiment.budget} in episodes of {experiment.n_rollouts}"],
         ["Seed", str(experiment.seed) if n_trials == 1 else f"{experiment.seed} and on, {n_trials} trials"],
     ]

@@ -27,7 +27,7 @@ function table(target, head, rows) {
 
 // Buttons that show a landing left or right; empty if the page does not carry it.
 function replayButtons(replay, index, what) {
-  const span = element("span", index < 0 ? "–" : undefined, { class: "buttons" });
+  const span = element("span", index < 0 ? "–" : undefined, index < 0 ? { title: "not carried by this page" } : { class: "buttons" });
   if (index < 0) return span;
   ["A", "B"].forEach((name, pane) => {
     const button = element("button", `▶ ${name}`, { type: "button", "aria-label": `replay ${what} in view ${name}` });
@@ -65,11 +65,11 @@ function showLearn(data, replay) {
   $("#convergence-plot").on("plotly_click", ({ points: [point] }) => { if (point.customdata !== undefined) replay.show(0, rollouts.landing[point.customdata]); });
   if (series.length > 1) fillChoice($("#trial"), learn.episodes.map((_, i) => `trial ${i}`), draw);
   $("#notable").hidden = false;
-  table($("#notable-table"), ["landing", "return", "feet", "RREV_c", "M_yd", "replay"], learn.notable.map(({ what, landing }) => {
+  table($("#notable-table"), ["landing", "return", "feet", "RREV_c, 1/s", "M_yd, N mm", "replay"], learn.notable.map(({ what, landing }) => {
     const { outcome, spec } = data.landings[landing];
     return [what, outcome.reward.toFixed(1), `${outcome.n_legs}${outcome.body_contact ? ", body" : ""}`, spec.rrev_c_per_s.toFixed(2), spec.moment_y_Nmm.toFixed(2), replayButtons(replay, landing, what)];
   }));
-  $("#convergence-note").textContent = "Rate: share of landings on four legs in an episode. Click a dot to replay that rollout in view A.";
+  $("#convergence-note").textContent = "Rate: share of landings on three or four legs in an episode. Click a dot to replay that rollout in view A.";
   [1, 0].forEach((pane) => replay.show(pane, learn.notable[learn.first_shown[pane]].landing));
 }
 
@@ -100,7 +100,13 @@ class SweepView {
     ["#rates", "#region"].forEach((id) => { $(id).hidden = false; });
     this.drawRates();
     this.drawRegion();
-    this.choose(this.cells.reduce((best, cell) => (cell.rate > best.rate ? cell : best)));
+    this.choose(this.firstShown());
+  }
+
+  // The cell with the best rate; of several the one nearest to the middle of the grid.
+  firstShown() {
+    const off = (cell) => Math.abs(cell.speed / this.sweep.speeds.length - 0.5) + Math.abs(cell.angle / this.sweep.angles.length - 0.5);
+    return this.cells.reduce((best, cell) => (cell.rate > best.rate || (cell.rate === best.rate && off(cell) < off(best)) ? cell : best));
   }
 
   // Stored columns -> one object a row.
@@ -131,8 +137,8 @@ class SweepView {
     [["#gear", cell.gear], ["#speed-choice", cell.speed], ["#angle-choice", cell.angle]].forEach(([id, value]) => { $(id).value = value; });
     outlineCell($("#polar-plot"), this.cells, cell);
     $("#cell-title").textContent = `${readable(sweep.gears[cell.gear])}, ${sweep.speeds[cell.speed]} m/s at ${sweep.angles[cell.angle]}°`;
-    $("#cell-rate").textContent = `landing rate ${percent(cell.rate)} (95 % interval ${percent(cell.lo)} to ${percent(cell.hi)}), best trial ${percent(cell.best)}`;
     const own = this.trials.filter((trial) => trial.cell === cell.id);
+    $("#cell-rate").textContent = `landing rate ${percent(cell.rate)} (95 % interval ${percent(cell.lo)} to ${percent(cell.hi)}, ${own.length} trials), best trial ${percent(cell.best)}`;
     table($("#trials-table"), ["trial", "rate", "clean", "RREV_c, 1/s", "M_yd, N mm", "best landing"], own.map((t) => [String(t.trial), percent(t.rate), percent(t.clean),
       `${t.mu_rrev.toFixed(2)} ± ${t.sigma_rrev.toFixed(2)}`, `${t.mu_moment.toFixed(2)} ± ${t.sigma_moment.toFixed(2)}`, replayButtons(this.replay, t.landing, `the best landing of trial ${t.trial}`)]));
     const others = this.cells.filter((c) => this.sameApproach(c, cell)).sort((a, b) => a.gear - b.gear);
@@ -171,7 +177,7 @@ class SweepView {
     select.replaceChildren(...trials.map((t, i) => new Option(`trial ${t.trial}`, i)));
     select.parentElement.hidden = trials.length < 2;
     select.onchange = () => draw(Number(select.value));
-    $("#convergence-note").textContent = `${$("#cell-title").textContent}; rate: share of landings on four legs in an episode; thin grey lines are the other trials of the cell.`;
+    $("#convergence-note").textContent = `${$("#cell-title").textContent}; rate: share of landings on three or four legs in an episode; thin grey lines are the other trials of the cell.`;
     draw(best);
   }
 

@@ -18,6 +18,7 @@ import numpy.typing as npt
 from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
 
 import ivl
+from ivl.learners import LEARNERS
 
 FOLDER = Path(__file__).parent
 SCRIPTS = ("data.js", "vehicle.js", "replay.js", "plots.js", "main.js")
@@ -55,6 +56,11 @@ def encode(values: npt.ArrayLike, unit: float) -> dict[str, Any]:
     numbers = np.asarray(values, dtype=np.float64)
     whole = np.rint(numbers / unit)
     return {"unit": unit, "values": [int(value) if math.isfinite(value) else None for value in whole.tolist()]}
+
+
+def learner_words(name: str) -> str:
+    """A learner as the page calls it: its name, and what it is."""
+    return f"{name}: {LEARNERS[name].doc.split(':')[0]}"
 
 
 def flatten(data: Mapping[str, Any], prefix: str = "") -> list[list[str]]:

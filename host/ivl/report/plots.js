@@ -2,11 +2,13 @@
 
 const FONT = { family: "system-ui, sans-serif", size: 12, color: INK };
 const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d", "toImage"] };
-const RATE_SCALE = "Viridis", MOMENT_SCALE = "Cividis";
-const OUTCOMES = [["four legs, clean", GREEN, "circle"], ["four legs, body contact", "#56B4E9", "square"],
+// as in the figures on paper: much ink is much success
+const RATE_SCALE = { colorscale: "Cividis", reversescale: true }, MOMENT_SCALE = { colorscale: "Viridis", reversescale: false };
+const OUTCOMES = [["three or four legs, clean", GREEN, "circle"], ["three or four legs, body contact", "#56B4E9", "square"],
   ["one or two legs", ORANGE, "triangle-up"], ["no leg", VERMILION, "x"]];
 
 const percent = (share) => (share === null || Number.isNaN(share) ? "–" : `${(100 * share).toFixed(0)}\u00a0%`);
+const fixed = (value, digits) => value.toFixed(digits).replace("-", "−");
 const readable = (name) => name.replaceAll("_", " ");
 
 // Numbers of a stored column { unit, values }; null is NaN.
@@ -21,10 +23,10 @@ function widths(centres) {
 
 // One polar plot a gear: angle of approach around, speed outwards, colour the landing rate.
 function polarFigure(sweep, cells, gears) {
-  const columns = Math.min(3, gears.length), rows = Math.ceil(gears.length / columns);
+  const columns = Math.min(window.innerWidth < 700 ? 2 : 3, gears.length), rows = Math.ceil(gears.length / columns);
   const dv = widths(sweep.speeds), dphi = widths(sweep.angles);
   const layout = { font: FONT, margin: { l: 8, r: 8, t: 22, b: 62 }, showlegend: false, annotations: [], height: 265 * rows + 62,
-    coloraxis: { cmin: 0, cmax: 1, colorscale: RATE_SCALE, colorbar: { orientation: "h", y: -0.01, yanchor: "top", title: { text: "landing rate, mean over the trials of a cell", side: "bottom", font: { size: 12 } }, thickness: 10, tickformat: ".0%", len: 0.7 } } };
+    coloraxis: { cmin: 0, cmax: 1, ...RATE_SCALE, colorbar: { orientation: "h", y: -0.01, yanchor: "top", title: { text: "landing rate, mean over the trials of a cell", side: "bottom", font: { size: 12 } }, thickness: 10, tickformat: ".0%", len: 0.7 } } };
   const traces = gears.map((gear, k) => {
     const own = cells.filter((cell) => cell.gear === gear), name = `polar${k ? k + 1 : ""}`;
     const [x0, y1] = [(k % columns) / columns, 1 - Math.floor(k / columns) / rows];
@@ -45,7 +47,7 @@ function polarAxes(x, y, sweep) {
   const n = sweep.angles.length - 1, last = sweep.angles[n] + widths(sweep.angles)[n] / 2;  // the last sector whole
   return { domain: { x, y }, sector: [0, Math.max(90, last)], bgcolor: "#f2f4f7",
     radialaxis: { range: [0, top], angle: 0, tickangle: 0, title: { text: "V (m/s)", font: { size: 10 } }, tickfont: { size: 10 }, nticks: 5, gridcolor: "rgba(0,0,0,0.08)" },
-    angularaxis: { tickvals: [0, 30, 60, 90], ticksuffix: "°", tickfont: { size: 10 }, gridcolor: "rgba(0,0,0,0.08)" } };
+    angularaxis: { tickvals: [0, 30, 60, 90], ticktext: ["0°", "30°", "60°", "90°"], tickfont: { size: 10 }, gridcolor: "rgba(0,0,0,0.08)" } };
 }
 
 // Outline of the chosen cell in all polar plots: that of its gear strong, the same approach of other gears weak.
@@ -63,15 +65,15 @@ function regionFigure(points, colour) {
   const byRate = colour === "rate";
   const trace = { type: "scatter3d", mode: "markers", x: points.rrev, y: points.ofY, z: points.d, customdata: points.cell, text: points.text,
     hovertemplate: "%{text}<br>RREV %{x:.2f} 1/s, OF_y %{y:.2f} rad/s, d %{z:.3f} m<extra></extra>",
-    marker: { size: 2.4, color: byRate ? points.rate : points.moment, colorscale: byRate ? RATE_SCALE : MOMENT_SCALE, cmin: byRate ? 0 : undefined, cmax: byRate ? 1 : undefined,
+    marker: { size: 2.4, color: byRate ? points.rate : points.moment, ...(byRate ? RATE_SCALE : MOMENT_SCALE), cmin: byRate ? 0 : undefined, cmax: byRate ? 1 : undefined,
       colorbar: { title: { text: byRate ? "landing rate" : "M_yd (N mm)", side: "right" }, thickness: 12, len: 0.7, tickformat: byRate ? ".0%" : undefined } } };
   const axis = (text) => ({ title: { text, font: { size: 12 } }, backgroundcolor: "#f7f8fa", gridcolor: "#dfe4ea", showbackground: true });
   const layout = { font: FONT, height: 520, margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "keep",
-    scene: { xaxis: axis("RREV (1/s)"), yaxis: axis("OF_y (rad/s)"), zaxis: axis("d (m)"), camera: { eye: { x: 1.25, y: -1.35, z: 0.6 }, center: { x: 0, y: 0, z: -0.12 } }, aspectmode: "manual", aspectratio: { x: 1.15, y: 1.15, z: 0.85 } } };
+    scene: { xaxis: axis("RREV (1/s)"), yaxis: axis("OF_y (rad/s)"), zaxis: axis("d (m)"), camera: { eye: { x: 1.4, y: -1.5, z: 0.65 }, center: { x: 0, y: 0, z: -0.16 } }, aspectmode: "manual", aspectratio: { x: 1.15, y: 1.15, z: 0.85 } } };
   return { traces: [trace], layout };
 }
 
-const PANELS = [["RREV_c (1/s)", "y"], ["M_yd (N mm)", "y2"], ["rate", "y3"], ["return", "y4"]];
+const PANELS = [["RREV_c (1/s)", "y"], ["M_yd (N mm)", "y2"], ["landing rate", "y3"], ["return", "y4"]];
 
 // Search of one trial over its rollouts: mu and mu +- 2 sigma of both parameters, landing rate, return. Thin lines: other trials.
 function convergenceFigure(series, others, rollouts, limits) {

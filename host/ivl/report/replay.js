@@ -90,6 +90,8 @@ class Replay {
     part("verdict").textContent = outcome.n_legs ? legs + body : `no foot stuck${outcome.body_contact || outcome.base_contact ? ", body contact" : ""}`;
     part("verdict").className = `verdict ${outcome.clean ? "good" : outcome.four_leg ? "fair" : "bad"}`;
     part("spec").textContent = `V ${spec.speed_mps} m/s, φ ${spec.angle_deg}°, RREV_c ${spec.rrev_c_per_s.toFixed(3)} 1/s, M_yd ${spec.moment_y_Nmm.toFixed(2)} N mm`;
+    const offset = this.data.geometry[pane.landing.geometry].sensed_gap_offset;
+    this.root.querySelector("#offset").textContent = offset ? `d sensed counts to a plane ${(1000 * offset).toFixed(0)} mm behind the ceiling.` : "";
     pane.canvas.setAttribute("aria-label", `Landing ${pane.name.toUpperCase()}: ${label}, ${part("verdict").textContent}. Arrow keys turn the view, plus and minus zoom.`);
   }
 
@@ -109,9 +111,9 @@ class Replay {
     const touched = pane.landing.outcome.t_impact_s !== null && state.t > pane.landing.outcome.t_impact_s;
     const none = (text) => (touched || !state.d ? "–" : text);  // samples stop meaning anything at the first contact
     const values = {
-      t: `${state.t.toFixed(3)} s`, phase: state.phase, rrev: none(`${state.rrev.toFixed(2)} 1/s`),
-      ofy: none(`${state.ofY.toFixed(2)} rad/s`), d: none(`${(1000 * state.d).toFixed(0)} mm`),
-      gap: `${(-1000 * state.pose.p[2]).toFixed(0)} mm`, pitch: `${state.pitch.toFixed(0)}°`, feet: stuck.length ? stuck.join(" ") : "none",
+      t: `${state.t.toFixed(3)} s`, phase: state.phase, rrev: none(`${fixed(state.rrev, 2)} 1/s`),
+      ofy: none(`${fixed(state.ofY, 2)} rad/s`), d: none(`${(1000 * state.d).toFixed(0)} mm`),
+      gap: `${fixed(-1000 * state.pose.p[2], 0)} mm`, pitch: `${fixed(state.pitch, 0)}°`, feet: stuck.length ? stuck.join(" ") : "none",
     };
     for (const [name, text] of Object.entries(values)) this.root.querySelector(`#${name}-${pane.name}`).textContent = text;
   }

@@ -66,6 +66,8 @@ def geometry(world: World) -> dict[str, Any]:
         "rotor": [values["rotor.x"], values["rotor.y"], values["rotor.z"], values["aero.rotor_radius"]],
         "hip": [values["leg.hip_xy"], values["leg.hip_z"]],
         "foot_radius": values["leg.foot_radius"],
+        "leg_length": values["leg.length"],
+        "sensed_gap_offset": values["world.sensed_gap_offset"],
     }
 
 

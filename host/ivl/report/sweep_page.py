@@ -14,7 +14,7 @@ from ivl.errors import StoreError
 from ivl.landing import LandingSpec
 from ivl.report import replay
 from ivl.report.landings import Album, thinned
-from ivl.report.page import encode, flatten
+from ivl.report.page import encode, flatten, learner_words
 from ivl.sweep import store
 from ivl.sweep.config import Sweep, load_sweep
 from ivl.sweep.schema import CELL, TRIAL_KEY
@@ -116,7 +116,7 @@ def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list
     n_solved = int((cells["rate_best_norm"] >= SOLVED_RATE).sum())
     return [
         ["Vehicle and gears", f"{sweep.vehicle}, {sweep.gear_set}"],
-        ["Learner", sweep.learner.name],
+        ["Learner", learner_words(sweep.learner.name)],
         ["Cells and trials", f"{len(cells)} cells, {_finished(sweep, trials)} trials"],
         ["Rollouts", f"{int(trials['n_rollouts'].sum()):,}"],
         ["Mean landing rate", f"{100 * cells['rate_mean_norm'].mean():.1f} %"],

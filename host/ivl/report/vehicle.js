@@ -6,9 +6,9 @@ const HIP_SIGNS = [[1, -1], [-1, -1], [-1, 1], [1, 1]];  // legs 1 front right, 
 const GRID_M = 0.05;
 
 // Projection of world points (origin on the ceiling) for a canvas of the given size.
-function makeCamera(view, state, width, height) {
+function makeCamera(view, geometry, state, width, height) {
   const d = Math.min(Math.max(-state.pose.p[2], 0.06), 0.9);
-  const half = (0.5 * d + 0.115) / view.zoom;  // half of the visible height, m
+  const half = (0.5 * d + 0.055 + Math.max(0.06, geometry.leg_length)) / view.zoom;  // half of the visible height, m
   const target = [state.pose.p[0], state.pose.p[1], state.pose.p[2] + 0.5 * d + 0.01];
   const [ca, sa, ce, se] = [Math.cos(view.azimuth), Math.sin(view.azimuth), Math.cos(view.elevation), Math.sin(view.elevation)];
   const right = [ca, -sa, 0], up = [sa * se, ca * se, ce], back = [-sa * ce, -ca * ce, se];
@@ -46,7 +46,7 @@ function drawCeiling(context, camera) {
   }
 }
 
-// Flown part solid, the rest dotted; a ring where the flip was triggered.
+// Flown part solid, the rest dotted.
 function drawTrail(context, camera, landing, state) {
   const flown = [], ahead = [camera.project(state.pose.p)];
   landing.t.forEach((t, i) => (t <= state.t ? flown : ahead).push(camera.project(landing.p.map((column) => column[i]))));
@@ -59,15 +59,18 @@ function drawTrail(context, camera, landing, state) {
     context.stroke();
   }
   context.setLineDash([]);
-  if (landing.outcome.t_trigger_s !== null && state.t >= landing.t0) {
-    const [x, y] = camera.project(stateAt(landing, landing.t0).pose.p);
-    context.strokeStyle = VERMILION;
-    context.lineWidth = 2;
-    context.beginPath();
-    context.arc(x, y, 5, 0, 7);
-    context.stroke();
-    label(context, "trigger", x + 9, y + 4, VERMILION);
-  }
+}
+
+// Where the flip was triggered.
+function drawTrigger(context, camera, landing, state) {
+  if (landing.outcome.t_trigger_s === null || state.t < landing.t0) return;
+  const [x, y] = camera.project(stateAt(landing, landing.t0).pose.p);
+  context.strokeStyle = VERMILION;
+  context.lineWidth = 2;
+  context.beginPath();
+  context.arc(x, y, 5, 0, 7);
+  context.stroke();
+  label(context, "trigger", x + 9, y + 14, VERMILION);
 }
 
 // Distance to the ceiling, until something touches it.
@@ -84,7 +87,8 @@ function drawGap(context, camera, landing, state) {
   label(context, `${(-1000 * state.pose.p[2]).toFixed(0)} mm`, (ends[0][0] + ends[1][0]) / 2 + 6, 0.35 * ends[0][1] + 0.65 * ends[1][1], BLUE);
 }
 
-function label(context, text, x, y, colour) {
+function label(context, text, x, y, colour, align = "left") {
+  context.textAlign = align;
   context.font = "12px system-ui, sans-serif";
   context.lineWidth = 3;
   context.strokeStyle = "rgba(255,255,255,0.85)";
@@ -109,7 +113,7 @@ function shapesOf(geometry, state, camera) {
   }
   feet.forEach((foot, k) => {
     const hip = world([HIP_SIGNS[k][0] * geometry.hip[0], HIP_SIGNS[k][1] * geometry.hip[0], geometry.hip[1]]);
-    shapes.push(segment(hip, foot.place, foot.state === 2 ? GREEN : FREE, foot.state === 2 ? 4 : 3), footShape(foot, k, geometry, camera));
+    shapes.push(segment(hip, foot.place, foot.state === 2 ? GREEN : FREE, foot.state === 2 ? 4 : 3), footShape(feet, k, geometry, camera));
   });
   return shapes;
 }
@@ -146,14 +150,21 @@ function segment(a, b, colour, width) {
   } };
 }
 
-// Stuck: green disc with a ring; sliding: orange; free: grey. The number tells legs apart without colour.
-function footShape(foot, k, geometry, camera) {
+// Stuck: green disc with a ring; sliding: orange ring; free: grey. The number tells legs apart without colour; it stands on
+// the side away from the foot across, so that the two of a narrow gear do not hide each other.
+function footShape(feet, k, geometry, camera) {
+  const foot = feet[k], across = camera.project(feet[3 - k].place)[0];
   return { points: [foot.place], draw(context, [[x, y]]) {
     const radius = Math.max(4, geometry.foot_radius * camera.scale);
     context.beginPath();
     context.arc(x, y, radius, 0, 7);
-    context.fillStyle = foot.state === 2 ? GREEN : foot.state === 1 ? ORANGE : FREE;
+    context.fillStyle = foot.state === 2 ? GREEN : foot.state === 1 ? "#ffffff" : FREE;
     context.fill();
+    if (foot.state === 1) {
+      context.strokeStyle = ORANGE;
+      context.lineWidth = 3;
+      context.stroke();
+    }
     if (foot.state === 2) {
       context.beginPath();
       context.arc(x, y, radius + 4, 0, 7);
@@ -161,7 +172,8 @@ function footShape(foot, k, geometry, camera) {
       context.lineWidth = 2;
       context.stroke();
     }
-    if (camera.half < 0.3) label(context, String(k + 1), x + radius + 5, y - radius - 2, foot.state === 2 ? "#00664b" : INK);
+    const side = x < across ? -1 : 1;
+    if (camera.half < 0.35) label(context, String(k + 1), x + side * (radius + 5), y - radius + 2, foot.state === 2 ? "#00664b" : INK, side < 0 ? "right" : "left");
   } };
 }
 
@@ -175,15 +187,16 @@ function drawMoment(canvas, landing, geometry, state, view) {
   }
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
-  const camera = makeCamera(view, state, width, height);
+  const camera = makeCamera(view, geometry, state, width, height);
   if (camera.below) drawCeiling(context, camera);
   drawTrail(context, camera, landing, state);
-  drawGap(context, camera, landing, state);
   const shapes = shapesOf(geometry, state, camera).map((shape) => {
     const projected = shape.points.map(camera.project);
     return { shape, projected, depth: projected.reduce((sum, point) => sum + point[2], 0) / projected.length };
   });
   shapes.sort((a, b) => a.depth - b.depth).forEach(({ shape, projected }) => shape.draw(context, projected));
   if (!camera.below) drawCeiling(context, camera);
+  drawGap(context, camera, landing, state);
+  drawTrigger(context, camera, landing, state);
   return { body: camera.project(state.pose.p).slice(0, 2), feet: state.feet.map((foot) => camera.project(foot.place).slice(0, 2)) };
 }
