@@ -120,6 +120,7 @@ def run(
             "learner": chosen.learner.name,
             "best": asdict(best),
             "discarded": n_discarded,
+            "warnings": source.warnings,
         }
         write_json(folder / "result.json", {**summary, "verdicts": [asdict(v) for v in verdicts]})
     return RunResult(folder, chosen, world, best, verdicts, history, rollouts, summary)

@@ -43,7 +43,13 @@ class Flown:
 
 
 class RolloutSource(Protocol):
-    """Flies plans. Results may come in any order and in any portions; each portion is stored as soon as it comes."""
+    """Flies plans. Results may come in any order and in any portions; each portion is stored as soon as it comes.
+
+    Attributes:
+        warnings: What a reader of the results has to know, one line each.
+    """
+
+    warnings: list[str]
 
     def fly(self, plan: Plan) -> Iterator[Flown]:
         """Fly every row of the plan once.
@@ -64,6 +70,7 @@ class WorldSource:
     def __init__(self, world: World, experiment: Experiment, threads: int | None = None) -> None:
         """Fly the experiment's approach in `world`."""
         self.world, self._experiment, self._threads = world, experiment, threads
+        self.warnings: list[str] = []
 
     def fly(self, plan: Plan) -> Iterator[Flown]:
         """Fly the plan; one portion with everything, and one with what the simulation could not bring to an end."""

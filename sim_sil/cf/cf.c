@@ -255,13 +255,30 @@ static bool outcome_read(uint32_t address, uint32_t size, uint8_t *bytes)
     return true;
 }
 
+static uint32_t world_size(void)
+{
+    return (uint32_t)sizeof ivl_cf_the.model.raw;
+}
+
+static bool world_read(uint32_t address, uint32_t size, uint8_t *bytes)
+{
+    const ivl_sim_params_t *raw = &ivl_cf_the.model.raw;
+    if (address > sizeof *raw || size > sizeof *raw - address)
+    {
+        return false;
+    }
+    memcpy(bytes, (const uint8_t *)raw + address, size);
+    return true;
+}
+
 const ivl_cf_memory_t *ivl_cf_memories(const ivl_cf_t *cf, size_t *n)
 {
     (void)cf;
-    static ivl_cf_memory_t memories[2];
+    static ivl_cf_memory_t memories[3];
     memories[0] = *ivl_cf_app_memory();
     memories[1] = (ivl_cf_memory_t){.type = IVL_CF_MEMORY_OUTCOME, .size = outcome_size, .read = outcome_read};
-    *n = 2;
+    memories[2] = (ivl_cf_memory_t){.type = IVL_CF_MEMORY_WORLD, .size = world_size, .read = world_read};
+    *n = sizeof memories / sizeof memories[0];
     return memories;
 }
 

@@ -94,7 +94,7 @@ bool ivl_cf_param_take_changed(ivl_cf_t *cf, size_t *index);
 
 typedef struct
 {
-    uint8_t type;                                                          ///< 0x18 flight recorder, 0x1E outcome of the last landing
+    uint8_t type;                                                          ///< 0x18 flight recorder, or one of IVL_CF_MEMORY_*
     uint32_t (*size)(void);                                                ///< bytes
     bool (*read)(uint32_t address, uint32_t size, uint8_t *bytes);         ///< false: not that range, or not now
     bool (*write)(uint32_t address, uint32_t size, const uint8_t *bytes);  ///< NULL: read-only
@@ -103,6 +103,7 @@ typedef struct
 const ivl_cf_memory_t *ivl_cf_memories(const ivl_cf_t *cf, size_t *n);
 
 #define IVL_CF_MEMORY_OUTCOME 0x1Eu
+#define IVL_CF_MEMORY_WORLD   0x1Fu        ///< ivl_sim_params_t: what is simulated, so that a host can compare
 #define IVL_CF_OUTCOME_MAGIC  0x4F4C5649u  ///< "IVLO"
 
 /// What the outcome memory begins with; an ivl_sim_outcome_t follows, all 0 before the first landing has ended.
@@ -112,6 +113,7 @@ typedef struct
     uint32_t episode;     ///< number of the landing: log sil.episode while log sil.ended is 1; 0: none yet
     uint32_t size;        ///< of the outcome behind the header
     uint32_t policy_seq;  ///< of the policy that was flown
+    uint32_t crc;         ///< ivl_wire_crc() of seed and stream of the landing (uint64_t each), and of the outcome
 } ivl_cf_outcome_header_t;
 
 // ---- text and packets

@@ -11,6 +11,16 @@ static double exact(double parameter, float from_parameter, float commanded)
     return (from_parameter >= commanded && from_parameter <= commanded) ? parameter : (double)commanded;
 }
 
+static uint64_t seed_of(const ivl_cf_settings_t *set)
+{
+    return (uint64_t)set->seed_hi << 32 | set->seed_lo;
+}
+
+static uint64_t stream_of(const ivl_cf_settings_t *set)
+{
+    return (uint64_t)set->stream_hi << 32 | set->stream_lo;
+}
+
 static ivl_sim_spec_t spec_of(const ivl_cf_settings_t *set)
 {
     const ivl_command_t *cmd = &ivl_app.in.cmd;
@@ -23,8 +33,8 @@ static ivl_sim_spec_t spec_of(const ivl_cf_settings_t *set)
         .rrev_c_per_s = {(double)policy->rrev_c_per_s},
         .moment_y_Nmm = {(double)policy->moment_y_Nm * 1.0e3},
         .d_ceil_m = {set->d_ceil_m},
-        .seed = {(uint64_t)set->seed_hi << 32 | set->seed_lo},
-        .stream = {(uint64_t)set->stream_hi << 32 | set->stream_lo},
+        .seed = {seed_of(set)},
+        .stream = {stream_of(set)},
         .start = {set->start},
     };
 }
@@ -34,8 +44,9 @@ static void end(ivl_cf_t *cf)
     ivl_cf_episode_t *e = &cf->episode;
     e->running = false;
     e->ended = 1;
-    e->header = (ivl_cf_outcome_header_t){IVL_CF_OUTCOME_MAGIC, e->number, (uint32_t)sizeof e->outcome, e->policy_seq};
     e->outcome = e->now;
+    const uint32_t crc = ivl_wire_crc(ivl_wire_crc(0, e->draws, sizeof e->draws), &e->outcome, sizeof e->outcome);
+    e->header = (ivl_cf_outcome_header_t){IVL_CF_OUTCOME_MAGIC, e->number, (uint32_t)sizeof e->outcome, e->policy_seq, crc};
 }
 
 /// @return false if there is no such landing
@@ -57,6 +68,8 @@ void ivl_cf_episode_begin(ivl_cf_t *cf)
     e->running = true;
     e->ended = 0;
     e->policy_seq = ivl_app.state.policy.seq;
+    e->draws[0] = seed_of(&cf->set);
+    e->draws[1] = stream_of(&cf->set);
     ivl_sim_outcome_clear(&e->now);
     if (cf->set.start == IVL_CF_START_AS_FLOWN)
     {

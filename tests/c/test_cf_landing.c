@@ -114,6 +114,8 @@ static ivl_sim_outcome_t fly(const ivl_sim_spec_t *spec, uint32_t seq)
     const ivl_cf_outcome_header_t header = read_outcome(&outcome);
     TEST_ASSERT_EQUAL_UINT32(seq, header.policy_seq);
     TEST_ASSERT_EQUAL_UINT32((uint32_t)before + 1u, header.episode);
+    const uint64_t draws[2] = {spec->seed[0], spec->stream[0]};
+    TEST_ASSERT_EQUAL_UINT32(ivl_wire_crc(ivl_wire_crc(0, draws, sizeof draws), &outcome, sizeof outcome), header.crc);
     return outcome;
 }
 

@@ -4,10 +4,11 @@ import struct
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fake_vehicle import FakeVehicle
+from fake_vehicle import FakeVehicle, Reply
 
 from ivl.errors import ConfigError, LinkError
 from ivl.links.connection import check_uri
@@ -33,6 +34,30 @@ def test_parameters_are_read_and_written_exactly(vehicle: FakeVehicle) -> None:
     assert got["ivl.mass"] == struct.unpack("<f", struct.pack("<f", 0.03))[0]
     assert (vehicle.params["sil.speed"][1], vehicle.params["ivl.cut"][1]) == (0.1 + 0.2, 0)
     assert vehicle.params["sil.seed"][1] == 2**32 - 1
+
+
+def test_value_that_the_vehicle_does_not_take_is_named(server: SilProcess) -> None:
+    with Session(server.uri, replace(SHORT, answer_s=0.5)) as session:
+        session.write({"fault.seed": 3})
+        with pytest.raises(LinkError, match=r"parameter fault\.loss: value nan is not .* it answers 0 \("):
+            session.write({"fault.seed": 4, "fault.loss": float("nan"), "fault.delay_ms": 0.0})
+        with pytest.raises(LinkError, match=r"parameter sil\.speed_factor: value 5000 is not .* it answers 1000 \("):
+            session.write({"sil.speed_factor": 5000})
+
+
+def test_late_answer_to_an_older_write_is_not_taken_for_a_refusal(vehicle: FakeVehicle) -> None:
+    def echo_the_last_one_first(reply: Reply) -> list[Reply]:
+        if reply[:2] != (2, 2):
+            return [reply]
+        seen.append(reply)
+        return seen[-2:]
+
+    seen: list[Reply] = []
+    vehicle.change = echo_the_last_one_first
+    with Session(vehicle.uri, SHORT) as session:
+        for value in range(5):
+            session.write({"sil.seed": value})
+    assert vehicle.params["sil.seed"][1] == 4
 
 
 def test_memory_is_read_whole_when_it_takes_many_packets(vehicle: FakeVehicle) -> None:

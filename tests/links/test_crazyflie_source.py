@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from ivl.links.deadlines import Deadlines
 from ivl.links.episode import Rollout
 from ivl.links.options import Options
 from ivl.links.packets import Packet, PacketType, Phase
+from ivl.links.tables import Session
 from ivl.silproc import SilProcess
 from ivl.source import Plan, WorldSource
 
@@ -104,17 +106,41 @@ def test_recorder_is_read_whatever_the_landing_comes_to(
     assert mine["p_W_m"][:20, 2] == pytest.approx(known.p_WB_m[:20, 2], abs=0.03)
 
 
-def test_another_world_at_the_other_end_is_told(vertical: Experiment, plan: Plan) -> None:
+def test_another_world_at_the_other_end_is_refused_and_named(vertical: Experiment) -> None:
+    other = vertical.model_copy(update={"gear_set": "table1"})
+    with SilProcess(other.make_world()) as server:
+        with pytest.raises(crazyflie.OtherWorld) as refused:
+            CrazyflieSource(server.uri, vertical, Options(start_hint="ivl sil --experiment mine.yaml"))
+        assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"
+        with CrazyflieSource(server.uri, other) as source:
+            assert source.warnings == []
+    text = str(refused.value)
+    assert text.startswith(f"{server.uri} simulates another world than paper_vertical: leg.angle 60 (here 50) deg")
+    assert text.endswith("start the right one with: ivl sil --experiment mine.yaml")
+
+
+def test_another_world_is_flown_when_that_is_wanted(vertical: Experiment, plan: Plan) -> None:
     other = vertical.model_copy(update={"gear_set": "table1"})
     said: list[str] = []
     with SilProcess(other.make_world()) as server:
-        with CrazyflieSource(server.uri, vertical, Options(say=said.append)) as source:
+        options = Options(say=said.append, other_world=True)
+        with CrazyflieSource(server.uri, vertical, options) as source:
             next(source.fly(first(plan, 1)))
-        assert [line for line in said if "simulates another world than paper_vertical" in line]
-        said.clear()
-        with CrazyflieSource(server.uri, other, Options(say=said.append)):
-            pass
-        assert said == []
+        assert len(source.warnings) == 1
+        assert source.warnings == [line for line in said if "simulates another world than paper_vertical" in line]
+
+
+def test_run_stops_when_the_vehicle_comes_back_in_another_world(
+    server: SilProcess, vertical: Experiment, plan: Plan
+) -> None:
+    other = vertical.model_copy(update={"gear_set": "table1"})
+    with CrazyflieSource(server.uri, vertical) as source:
+        flight = source.fly(first(plan, 2))
+        next(flight)
+        port = int(server.uri.rpartition(":")[2])
+        server.kill()
+        with SilProcess(other.make_world(), port=port), pytest.raises(crazyflie.OtherWorld):
+            next(flight)
 
 
 def test_software_vehicle_gets_its_time_back(server: SilProcess, vertical: Experiment, plan: Plan) -> None:
@@ -274,10 +300,54 @@ def test_outcome_of_another_policy_is_not_scored(
 ) -> None:
     monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 1)
     with CrazyflieSource(server.uri, vertical) as source:
-        put = vehicles.Vehicle.put_policy
-        monkeypatch.setattr(vehicles.Vehicle, "put_policy", lambda *args: put(*args) + 1)
+        confirm = vehicles.Vehicle.confirm_policy
+        monkeypatch.setattr(vehicles.Vehicle, "confirm_policy", lambda self: confirm(self) + 1)
         with pytest.raises(RolloutError, match="discarded 1 times"):
             next(source.fly(first(plan, 1)))
+
+
+@pytest.mark.parametrize("damage", ["another seed", "a byte of another outcome"])
+def test_outcome_that_does_not_belong_to_what_was_asked_is_not_scored(
+    server: SilProcess, vertical: Experiment, plan: Plan, monkeypatch: pytest.MonkeyPatch, damage: str
+) -> None:
+    monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 1)
+    said: list[str] = []
+    with CrazyflieSource(server.uri, vertical, Options(say=said.append)) as source:
+        read = Session.read_memory
+
+        def garbled(*arguments: Any) -> bytes:
+            data = bytearray(read(*arguments))
+            data[100] ^= 1
+            return bytes(data)
+
+        if damage == "another seed":
+            # as an older write would do that arrives late
+            monkeypatch.setattr(source._field, "before_approach", lambda _: server.set("sil.seed_lo", 99))
+        else:
+            monkeypatch.setattr(Session, "read_memory", garbled)
+        with pytest.raises(RolloutError, match="discarded 1 times"):
+            next(source.fly(first(plan, 1)))
+    assert "its check sum is that of other random numbers, or bytes" in said[0]
+
+
+def test_vehicle_does_not_miss_its_host_when_commands_are_lost_one_after_the_other(
+    server: SilProcess, vertical: Experiment, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    send, n_commands = Session.send, 0
+
+    def lossy(session: Session, port: int, channel: int, data: bytes) -> None:
+        nonlocal n_commands
+        is_command = (port, channel, data[0]) == (13, 2, PacketType.COMMAND)
+        n_commands += is_command
+        if not is_command or n_commands % 8 == 0:
+            send(session, port, channel, data)
+
+    with CrazyflieSource(server.uri, vertical) as source:
+        monkeypatch.setattr(Session, "send", lossy)
+        flown = list(source.fly(first(plan, 2)))
+        assert source.n_discarded == 0
+    (wanted,) = WorldSource(vertical.make_world(), vertical).fly(first(plan, 2))
+    assert b"".join(part.outcomes.tobytes() for part in flown) == wanted.outcomes.tobytes()
 
 
 def test_bounds_beyond_the_vehicle_are_refused_before_the_first_flight(server: SilProcess) -> None:

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ivl import native
-from ivl.links import fields, preflight, vehicle
+from ivl.links import clock, fields, preflight, vehicle
 from ivl.links.deadlines import DEADLINES
 from ivl.links.episode import HEIGHT_M_MIN, OUTSIDE_RULES
 
@@ -33,7 +33,9 @@ def test_numbers_of_the_preflight_are_those_of_the_code() -> None:
         f"{preflight.BATTERY_V_MIN:.2f} V at rest",
         f"at most {1e3 * preflight.SIGMA_M_MAX:.0f} mm, within {preflight.SIGMA_S:.0f} s",
         f"below {HEIGHT_M_MIN} m of height",
-        f"{1 / vehicle.HEARTBEAT_S:.1f} Hz of vehicle time",
+        f"The command ({1 / clock.FINE.beat_s:.1f} Hz, one packet)",
+        f"sent {1 / clock.COARSE.beat_s:.0f} times a second of vehicle time",
+        f"has not answered one for {vehicle.UNHEARD_S_MAX} s of its time",
     ):
         assert text in PAGE, text
     assert fields.Gate().battery_V == preflight.BATTERY_V_MIN

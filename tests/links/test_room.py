@@ -76,9 +76,9 @@ def truth(vehicle: Vehicle) -> np.ndarray:
     number = vehicle.session.memory(0x1E)
     assert number is not None
     dtype = native.library().outcome_dtype
-    data = vehicle.session.read_memory(number, 0, 16 + dtype.itemsize, "outcome")
-    assert struct.unpack("<4L", data[:16])[2] == dtype.itemsize
-    return np.frombuffer(data[16:], dtype=dtype)
+    data = vehicle.session.read_memory(number, 0, 20 + dtype.itemsize, "outcome")
+    assert struct.unpack("<5L", data[:20])[2] == dtype.itemsize
+    return np.frombuffer(data[20:], dtype=dtype)
 
 
 def vehicle_of(source: CrazyflieSource) -> Vehicle:
@@ -176,7 +176,7 @@ def test_locked_vehicle_is_refused_with_what_to_do(source: CrazyflieSource) -> N
 def test_vehicle_is_brought_down_and_disarmed_from_any_phase(source: CrazyflieSource, phase: Phase) -> None:
     vehicle, field = vehicle_of(source), source._field
     assert field is not None
-    start_W_m = field.to_start()
+    start_W_m = field.to_start(GOOD)
     vehicle.put_policy(4.8, 8.0)
     vehicle.ask_for(Command(Request.HOVER, start_W_m), (Phase.READY,), 5.0)
     if phase != Phase.READY:
@@ -193,7 +193,7 @@ def test_vehicle_is_brought_down_and_disarmed_from_any_phase(source: CrazyflieSo
 def test_hovering_vehicle_is_landed(source: CrazyflieSource) -> None:
     vehicle, field = vehicle_of(source), source._field
     assert field is not None
-    field.to_start()
+    field.to_start(GOOD)
     assert make_safe(vehicle) == "landed, disarmed"
     assert vehicle.position_W_m[2] < 0.1
 

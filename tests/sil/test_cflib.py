@@ -18,6 +18,7 @@ from cflib.crazyflie.log import LogConfig
 from ivl import silproc
 from ivl.errors import LinkError
 from ivl.silproc import SilProcess
+from ivl.world import World
 
 
 def log(cf, wait_for, names: list[str], period_ms: int = 10, n: int = 5) -> list[tuple[int, dict[str, Any]]]:
@@ -219,13 +220,18 @@ def test_emergency_stop_locks_the_vehicle(sil, connected, wait_for):
 def test_memories_are_read(sil, connected, wait_for):
     with connected(sil.uri) as cf:
         types = {memory.type: memory for memory in cf.mem.mems}
-        assert set(types) == {0x18, 0x1E}
+        assert set(types) == {0x18, 0x1E, 0x1F}
         done: list[bytes] = []
         cf.mem.mem_read_cb.add_callback(lambda _, __, data: done.append(bytes(data)))
         assert cf.mem.read(types[0x1E], 0, 64)
         wait_for("the memory", lambda: done)
         assert struct.unpack_from("<L", done[0])[0] == 0x4F4C5649
         assert len(done[0]) == 64
+        values = World().params.values
+        known = [value for name, value in values.items() if not name.startswith("firmware.")]
+        assert cf.mem.read(types[0x1F], 0, 8 * len(known))
+        wait_for("the world", lambda: len(done) > 1)
+        assert list(struct.unpack(f"<{len(known)}d", done[1])) == known
 
 
 def test_app_answers_on_its_channel(sil, connected, wait_for):

@@ -21,7 +21,7 @@ asks the operator for the outcome; a software vehicle is reset into the air and 
 \b
 Examples:
   ivl fly --uri udp://127.0.0.1:19850 --rrev 4.8 --moment 8
-      one landing of the software vehicle (start it with: ivl sil)
+      one landing of the software vehicle (docs/SIL.md starts one)
   ivl fly --uri udp://127.0.0.1:19850 --rrev 4.8 --moment 8 --rehearse
       the same as if it were a drone: every question, take-off and all
   ivl fly --uri radio://0/80/2M/E7E7E7E7E7 --rrev 4.8 --moment 8 --csv landing.csv
@@ -56,7 +56,10 @@ def fly(
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
     tracker = mocap_config.load(mocap) if mocap else None
-    options = Options(mocap=tracker, rehearse=rehearse, keep_recordings=csv is not None, say=console.say)
+    # one landing is also of interest in another world; it is told
+    options = Options(
+        mocap=tracker, rehearse=rehearse, other_world=True, keep_recordings=csv is not None, say=console.say
+    )
     with crazyflie.CrazyflieSource(uri, chosen, options) as source:
         landing = source.fly_one(Rollout(rrev, moment, seed, stream))
         end_reason = source.world.end_reason(int(landing.outcome["end_reason"][0]))
@@ -64,7 +67,7 @@ def fly(
         csv.write_text(landing.recording.to_csv(), encoding="utf-8")
     result = {"snapshot": _snapshot(landing), "outcome": _outcome(landing.outcome, end_reason)}
     if as_json:
-        console.print_json(result)
+        console.print_json({**result, "warnings": source.warnings})
         return
     for title, values in result.items():
         console.out.print(title, style="bold")

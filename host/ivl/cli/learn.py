@@ -1,5 +1,6 @@
 """`ivl learn`."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,12 +31,16 @@ Examples:
   ivl learn experiments/paper_vertical.yaml --uri pil://
       every tick decided by an emulated STM32
   ivl learn experiments/paper_vertical.yaml --uri udp://127.0.0.1:19850
-      the whole stack: a software vehicle, started with `ivl sil`, over the protocol of the drone
+      the whole stack, over the protocol of the drone: a software vehicle, started with
+      ivl sil --experiment experiments/paper_vertical.yaml
   ivl learn experiments/paper_vertical.yaml --uri radio://0/80/2M/E7E7E7E7E7 --mocap lab.yaml
       the drone, tracked; see docs/HARDWARE.md and docs/HOST.md first
   ivl learn --resume --out runs/mine
       go on after Ctrl-C, kill -9 or power loss
 """
+
+
+_PORT_USUAL = "19850"
 
 
 def learn(
@@ -58,6 +63,9 @@ def learn(
     mocap: Annotated[
         str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
     ] = None,
+    other_world: Annotated[
+        bool, typer.Option("--other-world", help="Fly a software vehicle that simulates another world, too.")
+    ] = False,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
 ) -> None:
@@ -65,13 +73,18 @@ def learn(
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], out, resume)
     folder = out or campaign.default_folder(chosen, n_trials, resume)
     hooks = campaign.Hooks(_announce, console.print_episode, _stage)
-    flight = Options(mocap=mocap_config.load(mocap) if mocap else None, say=console.say)
+    flight = Options(
+        mocap=mocap_config.load(mocap) if mocap else None,
+        other_world=other_world,
+        start_hint=_start_hint(path or str(folder / "config.yaml"), settings or [], uri or ""),
+        say=console.say,
+    )
     try:
         result = campaign.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight)
     except KeyboardInterrupt:
         console.err.print(
             f"interrupted; continue with: ivl learn --resume --out {folder}{f' --uri {uri}' if uri else ''}"
-            f"{f' --mocap {mocap}' if mocap else ''}",
+            f"{f' --mocap {mocap}' if mocap else ''}{' --other-world' if other_world else ''}",
             highlight=False,
             soft_wrap=True,
         )
@@ -81,6 +94,13 @@ def learn(
         console.print_json(result.summary)
     else:
         _report(result, pictures)
+
+
+def _start_hint(path: str, settings: list[str], uri: str) -> str:
+    """Command that starts a software vehicle in the experiment's world."""
+    words = ["ivl", "sil", "--experiment", path, *(word for text in settings for word in ("--set", text))]
+    port = uri.rpartition(":")[2]
+    return shlex.join([*words, "--port", port] if uri.startswith("udp://") and port != _PORT_USUAL else words)
 
 
 def _choose(
@@ -125,6 +145,7 @@ def _report(result: campaign.RunResult, pictures: list[Path]) -> None:
     lines.append(("best possible policy (grid)", best_text))
     if summary["discarded"]:
         lines.append(("discarded rollouts (not learned from)", str(summary["discarded"])))
+    lines.extend(("note", text) for text in summary["warnings"])
     lines.append(("run folder", str(result.folder)))
     lines.extend(("picture", str(picture)) for picture in pictures)
     for name, text in lines:

@@ -1,10 +1,30 @@
 """Who makes time pass for the vehicle: the wall clock, or the host, step by step (lock-step)."""
 
 import time
+from dataclasses import dataclass
 from typing import Protocol
 
 from ivl.errors import LinkError
 from ivl.links.tables import LogBlock, Session
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Steps of vehicle time.
+
+    Attributes:
+        beat_s: Between two commands, the vehicle's proof that its host lives.
+        poll_s: Between two looks for an answer of the vehicle.
+    """
+
+    beat_s: float
+    poll_s: float
+
+
+FINE = Pace(beat_s=0.08, poll_s=0.01)
+"""12.5 Hz: of six commands in a row, one must arrive."""
+COARSE = Pace(beat_s=0.2, poll_s=0.06)
+"""Fewer round trips, for a vehicle whose time waits until it has heard its host."""
 
 _TIME_SEEN_S = 2.0
 _CATCH_UP_MS = 200
@@ -12,6 +32,8 @@ _CATCH_UP_MS = 200
 
 class Clock(Protocol):
     """Vehicle time as the host sees it."""
+
+    pace: Pace
 
     def now_s(self) -> float:
         """Time, s, from an arbitrary zero."""
@@ -28,6 +50,8 @@ class Clock(Protocol):
 
 class WallClock:
     """The vehicle lives in real time."""
+
+    pace = FINE
 
     def now_s(self) -> float:
         """Monotonic clock, s."""
@@ -48,13 +72,13 @@ class LockStep:
     flight is a function of the packets alone: the same on a busy machine and on an idle one.
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, pace: Pace = FINE) -> None:
         """Stop the vehicle's time, and learn where it stands.
 
         Raises:
             LinkError: The vehicle does not tell its time.
         """
-        self._session = session
+        self._session, self.pace = session, pace
         block = LogBlock(("sil.time_ms",), 10)
         session.write({"sil.lockstep": 0})
         session.start_log(block)

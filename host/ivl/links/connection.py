@@ -30,6 +30,13 @@ PING_S = 0.1
 _PINGS_KEPT = 50
 _RETRY_ROUND_TRIPS = 4.0
 _RTT_GAIN = 0.125
+_WHO_IS_ASKED = {
+    "udp": "is the software vehicle started, with `ivl sil`, and on this port?",
+    "radio": "is the vehicle switched on, and set to this channel, data rate and address?",
+    "usb": "is the vehicle switched on?",
+    "tcp": "is the bridge to the vehicle started, and on this port?",
+    "serial": "is the vehicle switched on, and wired to this port?",
+}
 _BUSY = "Busy: "  # a software vehicle says on the console who has it
 
 
@@ -60,7 +67,7 @@ class Connection:
         """
         check_uri(uri)
         self.uri, self.deadlines = uri, deadlines
-        self._waiting: dict[tuple[int, int], list[_Waiter]] = {}
+        self._waiting: dict[tuple[int, int], list[Waiter]] = {}
         self._listeners: list[tuple[int, int, Callable[[bytes], None]]] = []
         self._lock = threading.Lock()
         self._heard_s = time.monotonic()
@@ -105,7 +112,7 @@ class Connection:
             holder = next((line.strip() for line in reversed(list(self.console)) if line.startswith(_BUSY)), "")
             if holder:
                 return f"another client flies it ({holder}): stop that one first"
-            return "nobody answers (is the vehicle switched on, or the software vehicle started?)"
+            return f"nobody answers ({_WHO_IS_ASKED[self.uri.partition('://')[0]]})"
         return "the tables of parameters and log variables did not arrive (bad link)"
 
     def close(self) -> None:
@@ -163,10 +170,10 @@ class Connection:
     ) -> list[bytes]:
         """Ask several questions, a few of them under way at any time; the deadline is from each answer to the next."""
         limit_s = self.deadlines.answer_s if deadline_s is None else deadline_s
-        waiter = _Waiter({answer: i for i, (_, answer) in enumerate(questions)})
+        waiter = Waiter({answer: i for i, (_, answer) in enumerate(questions)})
         waiting, answers = deque(range(len(questions))), [b""] * len(questions)
         asked: dict[int, _Asked] = {}
-        with self._heard_by(port, channel, waiter):
+        with self.heard_by(port, channel, waiter):
             last_s = time.monotonic()
             while waiting or asked:
                 while waiting and len(asked) < self.deadlines.window:
@@ -198,7 +205,7 @@ class Connection:
         self._listeners.append((port, channel, listener))
 
     @contextlib.contextmanager
-    def _heard_by(self, port: int, channel: int, waiter: "_Waiter") -> Iterator[None]:
+    def heard_by(self, port: int, channel: int, waiter: "Waiter") -> Iterator[None]:
         """Let a waiter see the packets of a channel."""
         with self._lock:
             self._waiting.setdefault((port, channel), []).append(waiter)
@@ -268,15 +275,17 @@ class _Asked:
         return True
 
 
-class _Waiter:
+class Waiter:
     """Answers that somebody waits for; `offer` is called by the link's thread."""
 
     def __init__(self, index_of: Mapping[bytes, int]) -> None:
+        """Tell how the answers begin, and the number of the question that each belongs to."""
         self._index_of = index_of
         self._sizes = sorted({len(answer) for answer in index_of}, reverse=True)
         self._found: queue.SimpleQueue[tuple[int, bytes]] = queue.SimpleQueue()
 
     def offer(self, data: bytes) -> None:
+        """Take a packet if it is an answer."""
         for size in self._sizes:
             index = self._index_of.get(data[:size])
             if index is not None:
@@ -309,7 +318,7 @@ def _explain(uri: str, text: str) -> str:
     if uri.startswith("usb://") and text.startswith("Could not open"):
         return "no Crazyflie is plugged in"
     if "Connection refused" in text:
-        return "nobody listens there (start the software vehicle with `ivl sil`)"
+        return f"nobody listens there ({_WHO_IS_ASKED[uri.partition('://')[0]]})"
     if text.startswith("No driver found"):
         return "the URI is malformed"
     return text

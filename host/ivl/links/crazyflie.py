@@ -16,7 +16,7 @@ from ivl import native
 from ivl.errors import LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight, sil
-from ivl.links.clock import Clock, LockStep, WallClock
+from ivl.links.clock import COARSE, FINE, Clock, LockStep, WallClock
 from ivl.links.connection import check_uri
 from ivl.links.episode import Episode, Field, Landing, Rollout, make_safe, safe_or_why, start_point
 from ivl.links.fields import Room, SilField
@@ -31,12 +31,16 @@ from ivl.source import Flown, Plan
 
 ATTEMPTS_MAX = 10
 _AGAIN_S, _IDLE_S = 0.2, 3.0
-_OTHER_WORLD = "outcomes will differ from those in process (start it with: ivl sil --experiment FILE)"
+_DIFFERENCES_TOLD = 6
 JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
 
 
 class VehicleAway(RolloutError):
     """The vehicle was lost and did not come back in time; the run can be resumed."""
+
+
+class OtherWorld(RolloutError):
+    """The software vehicle simulates another world than the experiment's: what is learned there holds only there."""
 
 
 class CrazyflieSource:
@@ -49,6 +53,7 @@ class CrazyflieSource:
             ConfigError: The URI is none, or the approach does not fit under the ceiling.
             LinkError: The vehicle cannot be reached.
             RolloutError: It must not fly as it is; the message says why and what to do.
+            OtherWorld: It simulates another world, and the options do not allow that.
         """
         check_uri(uri)
         self.uri, self._experiment, self.options = uri, experiment, options or Options()
@@ -58,15 +63,32 @@ class CrazyflieSource:
         self._tracking: Tracking | None = None
         self.n_discarded = 0
         """Flights that were not scored and were flown again."""
+        self.warnings: list[str] = []
+        """What a reader of the results has to know."""
         self._connect()
         try:
-            if self._is_sil and not self._flies_our_world():
-                self.options.say(f"{uri} simulates another world than {experiment.name}: {_OTHER_WORLD}")
+            if self._is_sil and not self.warnings and not self._has_our_bits():
+                self._meet_other_world("all parameters are the same, but one landing has other bits: another version?")
         except BaseException:
             self.close()
             raise
 
-    def _flies_our_world(self) -> bool:
+    def _compare_worlds(self, session: Session) -> None:
+        """With each connection, since a vehicle may have been started anew, and otherwise."""
+        found = sil.differences(session, self.world)
+        if found:
+            rest = f", and {len(found) - _DIFFERENCES_TOLD} more" if len(found) > _DIFFERENCES_TOLD else ""
+            self._meet_other_world(", ".join(found[:_DIFFERENCES_TOLD]) + rest)
+
+    def _meet_other_world(self, what: str) -> None:
+        text = f"{self.uri} simulates another world than {self._experiment.name}: {what}"
+        if not self.options.other_world:
+            raise OtherWorld(f"{text}; start the right one with: {self.options.start_hint}")
+        if text not in self.warnings:
+            self.warnings.append(text)
+            self.options.say(text)
+
+    def _has_our_bits(self) -> bool:
         """Whether one landing there has the bits that it has here."""
         policy = self._experiment.policy
         probe = Rollout(policy.rrev_c_per_s.mu0, policy.moment_y_Nmm.mu0)
@@ -134,8 +156,10 @@ class CrazyflieSource:
                 return Flown(index, outcome, reason)
             except PolicyRefused as error:
                 self._note(rollout, f"refused: {error}")
+                if not self._is_sil and self._vehicle is not None:
+                    self.options.say(f"vehicle: {safe_or_why(self._vehicle)}")
                 return Flown(index, _refused(), f"vehicle: {error}")
-            except (OperatorStopped, VehicleAway):
+            except (OperatorStopped, VehicleAway, OtherWorld):
                 raise
             except LinkError as error:
                 self._discard(rollout, attempt, error)
@@ -182,6 +206,7 @@ class CrazyflieSource:
     def _prepare(self, vehicle: Vehicle, software: bool, again: bool) -> Vehicle:
         self._field = self._make_field(vehicle, software)
         if self._is_sil:
+            self._compare_worlds(vehicle.session)
             sil.reset(vehicle)
         elif software:
             sil.put_on_floor(vehicle)
@@ -203,7 +228,7 @@ class CrazyflieSource:
         """Lock-step where it can be had; cameras have a time of their own."""
         if not software or self._tracking is not None:
             return WallClock()
-        return LockStep(session)
+        return LockStep(session, FINE if self.options.rehearse else COARSE)
 
     def _make_field(self, vehicle: Vehicle, software: bool) -> Field:
         if software and not self.options.rehearse:

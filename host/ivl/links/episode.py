@@ -1,6 +1,6 @@
 """One landing, from the ground or from a reset to its outcome: the one way to fly, whatever the link.
 
-    to the start point -> policy confirmed -> hover -> approach -> (the vehicle decides) -> outcome
+    to the start point -> hover, policy confirmed -> approach -> (the vehicle decides) -> outcome
 
 The only two differences between a drone and a software vehicle are how it comes to the start point, and who knows the
 outcome; both are objects here (`Field`).
@@ -65,7 +65,7 @@ class Landing:
 class Field(Protocol):
     """Where is flown: how the vehicle gets to its start point, and who knows what came of the landing."""
 
-    def to_start(self) -> Point:
+    def to_start(self, rollout: Rollout) -> Point:
         """Return when the vehicle hovers, not yet under the core's control; tells where the approach is to begin."""
         ...
 
@@ -95,10 +95,11 @@ class Episode:
         """
         vehicle = self.vehicle
         vehicle.begin_flight()
-        start_W_m = field.to_start()
+        start_W_m = field.to_start(rollout)
         battery_V = vehicle.battery_V
-        policy_seq = vehicle.put_policy(rollout.rrev_c_per_s, rollout.moment_y_Nmm)
+        vehicle.offer_policy(rollout.rrev_c_per_s, rollout.moment_y_Nmm)
         vehicle.ask_for(Command(Request.HOVER, start_W_m), (Phase.READY,), _READY_S)
+        policy_seq = vehicle.confirm_policy()
         field.before_approach(rollout)
         experiment = self._experiment
         approach = Command(Request.APPROACH, start_W_m, experiment.speed_mps, math.radians(experiment.angle_deg))

@@ -28,31 +28,19 @@ class SilField:
         """The vehicle must be a software vehicle (`sil.is_sil`)."""
         self._vehicle, self._experiment, self._keep = vehicle, experiment, keep_recordings
         self.extras = sil.Sil(vehicle)
-        self._before = 0
 
-    def to_start(self) -> Point:
-        """Reset; the simulator puts the vehicle to the start of each landing itself."""
-        self._vehicle.command = Command(Request.IDLE)
-        sil.reset(self._vehicle)
-        return self._vehicle.position_W_m
+    def to_start(self, rollout: Rollout) -> Point:
+        """Reset; the simulator puts the vehicle to the start of each landing itself, when its approach begins."""
+        experiment = self._experiment
+        spec = sil.Spec(experiment.speed_mps, experiment.angle_deg, rollout.seed, rollout.stream, experiment.start)
+        return self.extras.reset(spec)
 
     def before_approach(self, rollout: Rollout) -> None:
-        """Tell the simulator which landing this is to be."""
-        experiment = self._experiment
-        spec = sil.Spec(
-            experiment.speed_mps,
-            experiment.angle_deg,
-            rollout.rrev_c_per_s,
-            rollout.moment_y_Nmm,
-            rollout.seed,
-            rollout.stream,
-            experiment.start,
-        )
-        self._before = self.extras.prepare(spec)
+        """Nothing: the start has been told with the reset."""
 
     def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
         """The simulator's truth."""
-        outcome = self.extras.wait_for_outcome(self._before, policy_seq)
+        outcome = self.extras.wait_for_outcome(policy_seq)
         if not self._keep:
             return outcome, None
         # the end of the cycle is also that of a recording which is not full yet
@@ -100,8 +88,9 @@ class Room:
         self._tracking = tracking
         self._place = place
 
-    def to_start(self) -> Point:
+    def to_start(self, rollout: Rollout) -> Point:
         """Ask the operator, arm, take off, fly to the start point."""
+        del rollout
         vehicle = self._vehicle
         self._operator.place(self._start_W_m)
         if self._place is not None:

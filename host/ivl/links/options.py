@@ -26,6 +26,8 @@ class Options:
         operator: Who stands beside a real vehicle; None: asked in the terminal.
         mocap: Tracking system that follows the vehicle; None: somebody else streams poses, or the vehicle needs none.
         rehearse: Fly a software vehicle as if it were a drone: take-off, operator, no simulator's truth.
+        other_world: Fly a software vehicle even though it simulates another world than the experiment's.
+        start_hint: Command that starts a software vehicle in the experiment's world.
         keep_recordings: Download the flight recorder of a software vehicle too (of a drone always).
         say: Called with each line for people.
         deadlines: Limits of the link.
@@ -35,6 +37,8 @@ class Options:
     operator: "Operator | None" = None
     mocap: MocapConfig | None = None
     rehearse: bool = False
+    other_world: bool = False
+    start_hint: str = "ivl sil --experiment FILE"
     keep_recordings: bool = False
     say: Callable[[str], None] = silent
     deadlines: Deadlines = DEADLINES

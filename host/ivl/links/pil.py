@@ -118,6 +118,7 @@ class PilSource:
         self.chips = Chips(qemu_command(image_of(uri)))
         self.chips.attach(self.world)
         self._source = WorldSource(self.world, experiment, threads)
+        self.warnings: list[str] = []
 
     def fly(self, plan: Plan) -> Iterator[Flown]:
         """Fly the plan; one portion with everything.

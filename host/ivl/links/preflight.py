@@ -11,6 +11,7 @@ from typing import Any
 
 from ivl import native
 from ivl.experiment import Experiment
+from ivl.links import sil
 from ivl.links.packets import Phase
 from ivl.links.vehicle import Supervisor, Vehicle
 
@@ -57,6 +58,8 @@ def checks(vehicle: Vehicle, experiment: Experiment | None = None) -> Iterator[C
     if experiment is not None:
         yield policy_range(vehicle, experiment)
         yield configuration(vehicle, experiment)
+        if sil.is_sil(vehicle.session):
+            yield simulated_world(vehicle, experiment)
 
 
 def failures(found: list[Check]) -> str:
@@ -176,6 +179,15 @@ def configuration(vehicle: Vehicle, experiment: Experiment) -> Check:
     return Check(
         "configuration", found == crc, f"CRC {found:08x}", f"CRC {crc:08x} of {experiment.name}",
         "send it: ivl doctor --send, ivl fly or ivl learn with this experiment",
+    )  # fmt: skip
+
+
+def simulated_world(vehicle: Vehicle, experiment: Experiment) -> Check:
+    """What a software vehicle simulates."""
+    found = sil.differences(vehicle.session, experiment.make_world())
+    return Check(
+        "simulated world", not found, f"{len(found)} differ, the first {found[0]}" if found else "as here",
+        f"all parameters of {experiment.name}", "start it with: ivl sil --experiment FILE",
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ The parameters are in group `sil`; a vehicle without it is flown as a drone is.
 """
 
 import struct
+import zlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,11 +15,11 @@ from ivl.errors import LinkError
 from ivl.links.packets import Phase, Request
 from ivl.links.tables import LogBlock, Session
 from ivl.links.vehicle import Command, Vehicle
-from ivl.world import START_CODES
+from ivl.world import START_CODES, World
 
-MEMORY_OUTCOME = 0x1E
+MEMORY_OUTCOME, MEMORY_WORLD = 0x1E, 0x1F
 _MAGIC = 0x4F4C5649
-_HEADER = "<4L"
+_HEADER = "<5L"
 _AS_FLOWN = 255
 _RESET_S, _SEEN_S, _ENDED_S = 2.0, 0.06, 70.0
 _LAND_S, _LANDED_S = 3.0, 15.0
@@ -30,8 +31,6 @@ class Spec:
 
     speed_mps: float
     angle_deg: float
-    rrev_c_per_s: float
-    moment_y_Nmm: float
     seed: int
     stream: int
     start: str
@@ -51,11 +50,14 @@ class Sil:
         if number is None:
             raise LinkError(f"{self._session.uri}: the software vehicle has no outcome memory (0x1E)")
         self._memory = number
-        self._block = LogBlock(("sil.episode", "sil.ended"), 20)
+        self._draws = b""
+        self._block = LogBlock(("sil.ended",), 20)
         self._session.start_log(self._block)
+        x, y, z = self._session.read(("sil.start_x", "sil.start_y", "sil.start_z")).values()
+        self._start_W_m = (x, y, z)
 
-    def prepare(self, spec: Spec) -> int:
-        """Tell the start of the next approach; returns the number of the landing before it."""
+    def reset(self, spec: Spec) -> tuple[float, float, float]:
+        """Put the vehicle into hover, and tell it how the next approach begins; returns where it hovers, in W, m."""
         seed, stream = _halves(spec.seed), _halves(spec.stream)
         self._session.write(
             {
@@ -66,36 +68,32 @@ class Sil:
                 "sil.start": START_CODES[spec.start],
                 "sil.speed": spec.speed_mps,
                 "sil.angle": spec.angle_deg,
+                "sil.reset": 1,
             }
         )
-        return self._header()[1]
+        self._draws = struct.pack("<QQ", spec.seed, spec.stream)
+        self._block.values = {}
+        return self._start_W_m
 
-    def wait_for_outcome(self, before: int, policy_seq: int) -> np.ndarray[Any, np.dtype[np.void]]:
-        """Let time pass until the landing after number `before` is over; returns its outcome, shape (1,).
+    def wait_for_outcome(self, policy_seq: int) -> np.ndarray[Any, np.dtype[np.void]]:
+        """Let time pass until the landing is over; returns its outcome, shape (1,).
 
         Raises:
             RolloutError: It did not end.
             LinkError: The outcome is of another landing or policy.
         """
-        self._vehicle.wait(lambda: self._ended(before), _ENDED_S, "end of the landing")
-        magic, episode, size, seq = self._header()
-        dtype = native.library().outcome_dtype
-        if (magic, size, seq) != (_MAGIC, dtype.itemsize, policy_seq) or episode == before:
+        self._vehicle.wait(lambda: bool(self._block.values.get("sil.ended")), _ENDED_S, "end of the landing")
+        dtype, size = native.library().outcome_dtype, struct.calcsize(_HEADER)
+        data = self._session.read_memory(self._memory, 0, size + dtype.itemsize, "outcome")
+        magic, episode, found_size, seq, crc = struct.unpack(_HEADER, data[:size])
+        if (magic, found_size, seq) != (_MAGIC, dtype.itemsize, policy_seq):
             raise LinkError(
-                f"outcome: landing {episode} of policy {seq} with {size} bytes (expected one after {before}, of policy "
+                f"outcome: landing {episode} of policy {seq} with {found_size} bytes (expected one of policy "
                 f"{policy_seq}, {dtype.itemsize} bytes)"
             )
-        data = self._session.read_memory(self._memory, struct.calcsize(_HEADER), size, "outcome")
-        return np.frombuffer(data, dtype=dtype).copy()
-
-    def _ended(self, before: int) -> bool:
-        values = self._block.values
-        return bool(values) and values["sil.episode"] != before and bool(values["sil.ended"])
-
-    def _header(self) -> tuple[int, int, int, int]:
-        data = self._session.read_memory(self._memory, 0, struct.calcsize(_HEADER), "outcome: header")
-        magic, episode, size, seq = struct.unpack(_HEADER, data)
-        return magic, episode, size, seq
+        if crc != zlib.crc32(self._draws + data[size:]):
+            raise LinkError(f"outcome: landing {episode}: its check sum is that of other random numbers, or bytes")
+        return np.frombuffer(data[size:], dtype=dtype).copy()
 
     def close(self) -> None:
         """Let the next approach begin where the vehicle hovers."""
@@ -108,6 +106,27 @@ def reset(vehicle: Vehicle) -> None:
     vehicle.session.write({"sil.reset": 1})
     vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _RESET_S)
     vehicle.pause(_SEEN_S)
+
+
+def differences(session: Session, world: World) -> list[str]:
+    """What a software vehicle simulates otherwise than `world`: name, its value, and the value here.
+
+    The configuration of the flight core (`firmware.*`) is left out: the host sends its own.
+
+    Raises:
+        LinkError: The vehicle does not tell, or is of another version.
+    """
+    here = {name: value for name, value in world.params.values.items() if not name.startswith("firmware.")}
+    number = session.memory(MEMORY_WORLD)
+    if number is None:
+        raise LinkError(f"{session.uri}: the software vehicle does not tell its world (memory 0x1F): another version?")
+    there = struct.unpack(f"<{len(here)}d", session.read_memory(number, 0, 8 * len(here), "simulated world"))
+    units = native.library().params
+    return [
+        f"{name} {other:g} (here {value:g}) {units[name].unit}"
+        for (name, value), other in zip(here.items(), there, strict=True)
+        if other != value
+    ]
 
 
 def put_on_floor(vehicle: Vehicle) -> None:

@@ -9,12 +9,13 @@ from typing import Any
 from cflib.crazyflie.log import LogTocElement  # type: ignore[import-untyped]
 
 from ivl.errors import LinkError
-from ivl.links.connection import Connection
+from ivl.links.connection import Connection, Waiter
 from ivl.links.deadlines import DEADLINES, Deadlines
 
 _PORT_PARAM, _PORT_MEM, _PORT_LOG = 2, 4, 5
 _READ, _WRITE, _MISC, _MEM_READ = 1, 2, 3, 1
 _GET_DEFAULT = 8
+_IDENT_BYTES = 2
 _MEM_CHUNK = 24
 _LOG_BYTES_MAX, _LOG_ITEMS_MAX = 26, 9
 _LOG_CREATE, _LOG_APPEND, _LOG_START = 6, 7, 3
@@ -84,7 +85,11 @@ class Session(Connection):
         return float(struct.unpack(element.pytype, answer[4:])[0])
 
     def write(self, values: Mapping[str, float], deadline_s: float | None = None) -> None:
-        """Write parameters in any order; returns when the vehicle has acknowledged all of them."""
+        """Write parameters in any order; returns when the vehicle has acknowledged all of them.
+
+        Raises:
+            LinkError: A parameter is missing or read-only, the vehicle has taken another value, or is silent.
+        """
         questions = []
         for name, value in values.items():
             element = self._param(name)
@@ -92,8 +97,29 @@ class Session(Connection):
                 raise LinkError(f"{self.uri}: parameter {name} is read-only")
             data = struct.pack("<H", element.ident) + _pack(element.pytype, name, value)
             questions.append((data, data))
-        self.ask_many(_PORT_PARAM, _WRITE, questions, f"writing {', '.join(values)}"[:80], deadline_s)
+        answers = Waiter({data[:_IDENT_BYTES]: i for i, (data, _) in enumerate(questions)})
+        with self.heard_by(_PORT_PARAM, _WRITE, answers):
+            try:
+                self.ask_many(_PORT_PARAM, _WRITE, questions, f"writing {', '.join(values)}"[:80], deadline_s)
+            except LinkError:
+                self._blame_a_changed_value(list(values), questions, answers)
+                raise
         self.values.update(values)
+
+    def _blame_a_changed_value(self, names: list[str], questions: list[tuple[bytes, bytes]], answers: Waiter) -> None:
+        """Raise LinkError for a parameter that was answered with another value only: the vehicle did not take ours."""
+        heard: dict[int, bytes] = {}
+        while (item := answers.take(0.0))[0] >= 0:
+            i, data = item
+            heard[i] = data if heard.get(i) != questions[i][0] else heard[i]
+        for i, data in heard.items():
+            form = self._param(names[i]).pytype
+            if data != questions[i][0] and len(data) == len(questions[i][0]):
+                wanted, found = (struct.unpack(form, told[_IDENT_BYTES:])[0] for told in (questions[i][0], data))
+                raise LinkError(
+                    f"{self.uri}: parameter {names[i]}: value {wanted:g} is not what the vehicle has taken: it "
+                    f"answers {found:g} (beyond its range?)"
+                )
 
     def _param(self, name: str) -> Any:
         element = self._element(self.cf.param.toc, name)

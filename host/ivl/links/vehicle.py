@@ -1,7 +1,7 @@
 """A vehicle with the app of this project, over any link: configuration, policy, commands, supervisor, recorder.
 
 Whatever is put in force is confirmed by the vehicle itself before a call returns. Time is that of `clock`; each wait
-repeats the present command ten times a second and more, which is the vehicle's proof that its host lives.
+repeats the present command at the clock's pace, which is the vehicle's proof that its host lives.
 """
 
 import secrets
@@ -32,10 +32,10 @@ from ivl.links.packets import (
 from ivl.links.tables import LogBlock, Session
 from ivl.world import World
 
-HEARTBEAT_S = 0.08
-"""Vehicle time between two commands: 12.5 Hz; the vehicle aborts after `host_s_max`, 0.5 s."""
+UNHEARD_S_MAX = 0.4
+"""Vehicle time since the last answered command, from which on it is sent again and again; `host_s_max` is 0.5 s."""
 _PORT_SUPERVISOR, _PORT_HL, _PORT_PLATFORM, _APP = 9, 8, 13, 2
-_ECHO_S, _ECHO_POLL_S = 2.0, 0.01
+_ECHO_S, _CALL_S, _WALL_LOOK_S = 2.0, 0.01, 0.01
 _WALL_POLL_S = 0.005
 _LOGS_S = 3.0
 
@@ -86,6 +86,24 @@ class Snapshot:
     vz_mps: float
 
 
+@dataclass(frozen=True)
+class Offer:
+    """A policy on its way, in the numbers of the packet."""
+
+    seq: int
+    rrev_c_per_s: float
+    moment_y_Nm: float
+
+    @property
+    def data(self) -> bytes:
+        """The packet."""
+        return encode(PacketType.POLICY, seq=self.seq, rrev_c_per_s=self.rrev_c_per_s, moment_y_Nm=self.moment_y_Nm)
+
+    def __str__(self) -> str:
+        """As people know it."""
+        return f"policy RREV_c {self.rrev_c_per_s:g} 1/s, M_yd {1e3 * self.moment_y_Nm:g} N mm"
+
+
 class Vehicle:
     """A connected vehicle. `watch`, `state` and `trigger` are its log blocks, running from the start."""
 
@@ -103,6 +121,8 @@ class Vehicle:
         """Safety rule by which the vehicle aborted ("none": it was asked to); empty if it has not."""
         self._seq = secrets.randbits(16)
         self._policy_seq = secrets.randbits(31)
+        self._offer: Offer | None = None
+        self._unheard_s = 0.0
         self._echo: dict[PacketType, Packet] = {}
         self.watch = LogBlock(
             ("ivl.phase", "ivl.rule", "ivl.cause", "ivl.policy_seq", "ivl.trg_seq", "pm.vbat", "supervisor.info"), 20
@@ -137,16 +157,21 @@ class Vehicle:
     # ---- time
 
     def pause(self, span_s: float) -> None:
-        """Let vehicle time pass, with heartbeats."""
+        """Let vehicle time pass, with heartbeats; a vehicle that does not answer them is called more often."""
         left_s = span_s
         while left_s > 0.0:
-            self.send_command()
-            step_s = min(left_s, HEARTBEAT_S)
+            seq = self.send_command()
+            step_s = min(left_s, self.clock.pace.beat_s, max(UNHEARD_S_MAX - self._unheard_s, _CALL_S))
             self.clock.pause(step_s)
+            self._unheard_s = step_s if self._has_heard(seq) else self._unheard_s + step_s
             left_s -= step_s
 
-    def wait(self, condition: Callable[[], bool], limit_s: float, what: str, step_s: float = HEARTBEAT_S) -> None:
-        """Let time pass until a condition holds.
+    def _has_heard(self, seq: int) -> bool:
+        echo = self._echo.get(PacketType.COMMAND_ECHO)
+        return echo is not None and not _is_before(int(echo["seq"]), seq)
+
+    def wait(self, condition: Callable[[], bool], limit_s: float, what: str, step_s: float | None = None) -> None:
+        """Let time pass until a condition holds, which is looked at every `step_s`, or else with each heartbeat.
 
         Raises:
             RolloutError: It did not within `limit_s` of vehicle time.
@@ -156,7 +181,7 @@ class Vehicle:
         while not condition():
             if self.clock.now_s() >= end_s:
                 raise RolloutError(f"{what}: not within {limit_s:g} s ({self.describe()})")
-            self.pause(step_s)
+            self.pause(step_s or self.clock.pace.beat_s)
             if self.session.silence_s > self.session.deadlines.answer_s:
                 raise LinkError(f"{self.session.uri}: nothing was heard for {self.session.silence_s:.1f} s")
 
@@ -164,14 +189,14 @@ class Vehicle:
         """Let time pass until a condition holds; returns whether it does after `limit_s` at the latest."""
         end_s = time.monotonic() + limit_s
         while not (found := condition()) and time.monotonic() < end_s:
-            self.clock.pause(_ECHO_POLL_S)
+            self.clock.pause(_WALL_LOOK_S)
             time.sleep(_WALL_POLL_S)
         return found
 
     # ---- commands
 
     def send_command(self) -> int:
-        """Send the present command once; returns its number."""
+        """Send the present command once, and a policy that is not confirmed yet; returns the command's number."""
         self._seq = (self._seq + 1) % 0x10000
         c = self.command
         data = encode(
@@ -179,6 +204,8 @@ class Vehicle:
             hover_z_m=c.hover_W_m[2], speed_mps=c.speed_mps, angle_rad=c.angle_rad,
         )  # fmt: skip
         self.session.send(_PORT_PLATFORM, _APP, data)
+        if self._offer is not None and self._policy_echo(self._offer) is None:
+            self.session.send(_PORT_PLATFORM, _APP, self._offer.data)
         return self._seq
 
     def tell_reading(self, rrev_per_s: float | None, of_y_radps: float | None = None, age_s: float = 0.0) -> None:
@@ -186,8 +213,9 @@ class Vehicle:
         self.session.send(_PORT_PLATFORM, _APP, encode_reading(rrev_per_s, of_y_radps, age_s))
 
     def begin_flight(self) -> None:
-        """Forget how the last flight was aborted."""
+        """Forget how the last flight was aborted, and a policy that was never confirmed."""
         self.abort_reason = self.aborted_by = ""
+        self._offer = None
 
     def abort(self, reason: str) -> None:
         """Ask for an abort, once; before the trigger it is obeyed, later it changes nothing. From any thread."""
@@ -203,14 +231,14 @@ class Vehicle:
         """
         self.command = command
         first = self.send_command()
-        self.wait(lambda: self._has_answered(first, phases), limit_s, f"request {command.request.name}", _ECHO_POLL_S)
+        what = f"request {command.request.name}"
+        self.wait(lambda: self._has_answered(first, phases), limit_s, what, self.clock.pace.poll_s)
         return self.phase
 
     def _has_answered(self, first: int, phases: tuple[Phase, ...]) -> bool:
-        echo = self._echo.get(PacketType.COMMAND_ECHO)
-        if echo is None or _is_before(int(echo["seq"]), first):
+        if not self._has_heard(first):
             return False
-        if echo["status"] == Status.RANGE:
+        if self._echo[PacketType.COMMAND_ECHO]["status"] == Status.RANGE:
             raise RolloutError(f"request {self.command.request.name}: {STATUS_TEXT[Status.RANGE]}: {self.command}")
         return self.phase in phases
 
@@ -260,7 +288,7 @@ class Vehicle:
         self.session.write({name: value for name, value in wanted.items() if not _same(present[name], value)})
         seq = secrets.randbits(31) + 1
         self.session.write({"ivl.commit": seq})
-        self.wait(lambda: self._config_answer(seq) is not None, _ECHO_S, "configuration", _ECHO_POLL_S)
+        self.wait(lambda: self._config_answer(seq) is not None, _ECHO_S, "configuration", self.clock.pace.poll_s)
         status, bad, found = self._config_answer(seq) or (Status.PHASE, 255, 0)
         if status != Status.OK:
             name = list(fields)[bad] if bad < len(fields) else ""
@@ -282,33 +310,39 @@ class Vehicle:
     # ---- policy
 
     def put_policy(self, rrev_c_per_s: float, moment_y_Nmm: float) -> int:
-        """Put a policy in force and return its number, once the vehicle has said that this one is.
+        """`offer_policy`, and then `confirm_policy`."""
+        self.offer_policy(rrev_c_per_s, moment_y_Nmm)
+        return self.confirm_policy()
+
+    def offer_policy(self, rrev_c_per_s: float, moment_y_Nmm: float) -> None:
+        """From now on each command is followed by this policy, until the vehicle has confirmed it."""
+        self._policy_seq = self._policy_seq % 0xFFFF_FFFE + 1
+        self._offer = Offer(self._policy_seq, float(np.float32(rrev_c_per_s)), float(np.float32(moment_y_Nmm * 1e-3)))
+
+    def confirm_policy(self) -> int:
+        """The number of the policy on offer, once the vehicle has said that this one is in force.
 
         Raises:
             PolicyRefused: It is out of the vehicle's range.
             RolloutError: It was not confirmed.
         """
-        self._policy_seq = self._policy_seq % 0xFFFF_FFFE + 1
-        wanted = (self._policy_seq, float(np.float32(rrev_c_per_s)), float(np.float32(moment_y_Nmm * 1e-3)))
-        data = encode(PacketType.POLICY, seq=wanted[0], rrev_c_per_s=wanted[1], moment_y_Nm=wanted[2])
-        end_s = self.clock.now_s() + _ECHO_S
-        while (echo := self._policy_echo()) is None:
-            if self.clock.now_s() >= end_s:
-                raise RolloutError(f"policy {self._policy_seq}: not confirmed within {_ECHO_S:g} s")
-            self.session.send(_PORT_PLATFORM, _APP, data)
-            self.pause(2 * _ECHO_POLL_S)
-        status = Status(int(echo["status"]))
-        what = f"policy RREV_c {rrev_c_per_s:g} 1/s, M_yd {moment_y_Nmm:g} N mm"
+        offer = self._offer
+        if offer is None:
+            raise ValueError("no policy is on offer")
+        self.wait(lambda: self._policy_echo(offer) is not None, _ECHO_S, f"confirmation of {offer}", 2 * _CALL_S)
+        self._offer = None
+        echo = self._policy_echo(offer)
+        status = Status(int(echo["status"])) if echo else Status.PHASE
         if status == Status.RANGE:
-            raise PolicyRefused(f"{what}: the vehicle refused it: {STATUS_TEXT[status]}")
-        found = (echo["seq_in_force"], echo["rrev_c_per_s"], echo["moment_y_Nm"])
-        if status != Status.OK or found != wanted:
-            raise RolloutError(f"{what}: not in force: {STATUS_TEXT[status]}, the vehicle has {found}")
-        return self._policy_seq
+            raise PolicyRefused(f"{offer}: the vehicle refused it: {STATUS_TEXT[status]}")
+        found = (echo["seq_in_force"], echo["rrev_c_per_s"], echo["moment_y_Nm"]) if echo else ()
+        if status != Status.OK or found != (offer.seq, offer.rrev_c_per_s, offer.moment_y_Nm):
+            raise RolloutError(f"{offer}: not in force: {STATUS_TEXT[status]}, the vehicle has {found}")
+        return offer.seq
 
-    def _policy_echo(self) -> Packet | None:
+    def _policy_echo(self, offer: "Offer") -> Packet | None:
         echo = self._echo.get(PacketType.POLICY_ECHO)
-        return echo if echo is not None and echo["seq"] == self._policy_seq else None
+        return echo if echo is not None and echo["seq"] == offer.seq else None
 
     # ---- supervisor and high-level commander
 
