@@ -15,7 +15,7 @@ import cflib.crtp
 import pytest
 from cflib.crazyflie.log import LogConfig
 
-from ivl import silproc
+from ivl import native, silproc
 from ivl.errors import LinkError
 from ivl.silproc import SilProcess
 from ivl.world import World
@@ -314,17 +314,36 @@ def test_a_damaged_model_is_refused_by_line(world, monkeypatch):
 # ---- documentation
 
 
-def test_first_flight_of_the_documentation_lands(sil):
+def first_flight(sil: SilProcess) -> subprocess.CompletedProcess[str]:
+    """The script of the documentation."""
     script = Path(__file__).parents[2] / "docs" / "first_flight.py"
-    result = subprocess.run([sys.executable, script, sil.uri], capture_output=True, text=True, timeout=60, check=False)
-    assert result.returncode == 0, result.stderr
-    assert "commit" in result.stdout
-    phase, snapshot = result.stdout.splitlines()[-2:]
-    assert phase.startswith(("phase 5 ", "phase 6 "))
-    values = ast.literal_eval(snapshot)
-    assert values["ivl.trg_seq"] == values["ivl.policy_seq"] > 0
-    assert 4.8 <= values["ivl.trg_rrev"] < 5.1
-    assert sil.get("simTruth.z") > 2.0
-    again = subprocess.run([sys.executable, script, sil.uri], capture_output=True, text=True, timeout=60, check=False)
-    assert again.returncode == 1, "the snapshot of the landing before must not be taken for a second one"
-    assert again.stderr.splitlines()[-1].startswith("no landing")
+    environment = {**os.environ, "CFLIB_URI": sil.uri}
+    return subprocess.run(
+        [sys.executable, script], env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+
+
+def missed_its_host(sil: SilProcess) -> bool:
+    """A machine that was busy for half a second: the vehicle aborted, as it has to."""
+    return native.library().rule_name(int(sil.get("ivl.cause"))) == "host"
+
+
+def test_first_flight_of_the_documentation_lands(world):
+    for _ in range(5):
+        with SilProcess(world) as sil:
+            result = first_flight(sil)
+            if result.returncode == 1 and missed_its_host(sil):
+                continue
+            assert result.returncode == 0, result.stderr
+            parameters, logs, snapshot = result.stdout.splitlines()
+            assert "commit" in parameters.split()
+            assert "phase" in logs.split()
+            values = ast.literal_eval(snapshot)
+            assert values["ivl.phase"] in (5, 6)
+            assert 4.8 <= values["ivl.trg_rrev"] < 5.1
+            assert sil.get("simTruth.z") > 2.0
+            again = first_flight(sil)
+            assert again.returncode == 1, "the snapshot of the landing before must not be taken for a second one"
+            assert "no landing" in again.stderr.splitlines()[-1]
+            return
+    pytest.fail("the machine was too busy for real time, five times")
