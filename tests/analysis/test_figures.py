@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from ivl.cli import run
 from ivl.errors import ConfigError, StoreError
-from ivl.plots import campaign, fig04_convergence, fig09_gears, paper
+from ivl.plots import campaign, fig04_convergence, fig09_gears, paper, style
 from ivl.plots.campaign import Campaign
 from ivl.sweep import config, schema
 
@@ -57,6 +59,33 @@ def test_all_figures_are_drawn_in_vector_form_and_png(data: Campaign, tmp_path: 
     assert [p.name for p in drawn.files] == [f"{f.name}{s}" for f in paper.FIGURES for s in (".pdf", ".png")]
     assert all(is_picture(path) for path in drawn.files)
     assert not drawn.left_out
+
+
+def words(figure: Figure) -> list[Text]:
+    """Titles, labels, legends and notes of a figure; not the ticks, of which some lie outside and are not drawn."""
+    legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
+    found = [*figure.texts, *(text for legend in legends for text in legend.get_texts())]
+    for axis in figure.axes:
+        found += [axis.title, axis.xaxis.label, axis.yaxis.label, *axis.texts]
+    return [text for text in found if text.get_text().strip()]
+
+
+@pytest.mark.parametrize("learners", [["bo"], ["bo", "ephe"]])
+def test_no_word_of_a_figure_is_cut_off(
+    data: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, learners: list[str]
+) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr(style, "save", lambda figure, paths, _dpi: figures.append(figure) or list(paths))
+    some = Campaign(*(table[table["learner"].isin(learners)] for table in (data.trials, data.episodes)))
+    paper.draw_all(some, tmp_path, names=["fig04", "fig06", "fig09"])
+    assert len(figures) == 3
+    for figure in figures:
+        figure.draw_without_rendering()
+        for part in [*figure.legends, *words(figure)]:
+            box = part.get_window_extent()
+            assert min(box.x0, box.y0) >= -1, part
+            assert box.x1 <= figure.bbox.x1 + 1, part
+            assert box.y1 <= figure.bbox.y1 + 1, part
 
 
 def test_equal_campaigns_give_equal_svg_files(data: Campaign, tmp_path: Path) -> None:

@@ -66,8 +66,9 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
     )
     named = {t: h for axis in axes[[0, 2], 0] for h, t in zip(*axis.get_legend_handles_labels(), strict=True)}
     figure.legend(
-        list(named.values()), list(named), loc="outside lower center", ncols=3, fontsize=style.SMALL, frameon=False
-    )
+        list(named.values()), list(named), loc="outside lower center", ncols=3 if len(learners) > 1 else 2,
+        fontsize=style.SMALL, frameon=False,
+    )  # fmt: skip
     return style.save(figure, paths, dpi)
 
 

@@ -11,6 +11,8 @@ from ivl.plots import campaign, style
 from ivl.plots.campaign import RATE_MAP, Campaign
 
 NAME = "fig06_flow_space"
+_ABOVE_PT = 15.0
+"""Room between a panel and its title, for the names of the lines."""
 _MIDDLE = 0.98
 """Share of the points that the axes show; stray triggers of trials that never learned lie far outside."""
 
@@ -30,7 +32,7 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
         found["of_y_radps"], found["rrev_per_s"], c=found["rate_norm"], s=8, cmap=RATE_MAP, vmin=0, vmax=1,
         linewidths=0.15, edgecolors=style.GREY,
     )  # fmt: skip
-    left.set_title("landing rate of each trial", fontsize=style.NORMAL)
+    left.set_title("landing rate of each trial", fontsize=style.NORMAL, pad=_ABOVE_PT)
     good, bad = found[found["success"]], found[~found["success"]]
     right.scatter(
         good["of_y_radps"], good["rrev_per_s"], s=13, facecolors="none", edgecolors=style.BLUE, linewidths=0.8,
@@ -40,7 +42,9 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
         bad["of_y_radps"], bad["rrev_per_s"], s=8, color=style.VERMILION, marker="x", linewidths=0.7,
         label=f"below 0.8 ({len(bad)} trials)",
     )  # fmt: skip
-    right.set_title(f"success in (RREV, $OF_y$): {campaign.auc_text(found, 'flow')}", fontsize=style.NORMAL)
+    right.set_title(
+        f"success in (RREV, $OF_y$): {campaign.auc_text(found, 'flow')}", fontsize=style.NORMAL, pad=_ABOVE_PT
+    )
     legend = right.legend(
         title="landing rate", fontsize=style.SMALL, title_fontsize=style.NORMAL, frameon=False, ncols=2,
         loc="upper center", bbox_to_anchor=(0.5, -0.2),
@@ -69,15 +73,16 @@ def limit(axis: Axes, found: pd.DataFrame) -> None:
 
 def _draw_angles(axis: Axes) -> None:
     """Lines of equal approach angle: RREV = -OF_y tan(phi)."""
-    (x_low, _), (y_low, y_high) = axis.get_xlim(), axis.get_ylim()
+    (x_low, _), (y_low, y_high) = axis.get_xlim(), axis.get_ylim()  # their ends are named outside, clear of the points
     for angle_deg in (20, 30, 40, 60):
         slope = np.tan(np.deg2rad(angle_deg))
         end = max(x_low, -y_high / slope)
         axis.plot([0, end], [0, -end * slope], color=style.GREY, linewidth=0.5, zorder=0, scalex=False, scaley=False)
-        foot = -(y_low + 0.08 * (y_high - y_low)) / slope
-        if foot < x_low:  # the line passes below this window
+        if -end * slope < y_low:  # the line passes below this window
             continue
-        axis.text(
-            foot, -foot * slope, f"{angle_deg}°", fontsize=style.SMALL - 1, color=style.GREY, ha="center", va="center",
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5}, zorder=1,
+        at_top = end > x_low
+        axis.annotate(
+            f"{angle_deg}°" if at_top else rf"$\varphi$ = {angle_deg}°", (end, -end * slope),
+            xytext=(0, 1) if at_top else (4, 3), textcoords="offset points", fontsize=style.SMALL,
+            color=style.DIM, ha="center" if at_top else "left", va="bottom", annotation_clip=False,
         )  # fmt: skip

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ivl.errors import ConfigError
 
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-SKY, PURPLE, GREY = "#56B4E9", "#CC79A7", "#7F7F7F"
+SKY, PURPLE, GREY, DIM = "#56B4E9", "#CC79A7", "#7F7F7F", "#555555"
 SMALL, NORMAL = 8.0, 9.0
 DPI = 200
 
