@@ -2,5 +2,11 @@
 
 import signal
 
+from hypothesis import HealthCheck, settings
+
 # Who starts the tests in the background may have told them to ignore Ctrl-C; programs under test would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# The same examples in every run, none judged by how long it takes: a failure is one of the code, not of the machine.
+settings.register_profile("ivl", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("ivl")
