@@ -1,8 +1,10 @@
 """Clients of tracking systems in their own process: real ones, at a small server and at nobody."""
 
+import itertools
 import json
 import math
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -16,14 +18,16 @@ from typing import Any
 import pytest
 
 from ivl import cli
+from ivl.cli import mocap as mocap_cli
 from ivl.errors import LinkError
+from ivl.mocap import config as configs
 from ivl.mocap.config import MocapConfig, load
 from ivl.mocap.natnet import NatNetServer
 from ivl.mocap.stream import Mocap
 from ivl.mocap.tracker import request_of
-from ivl.mocap.watch import Status
+from ivl.mocap.watch import Pose, Status
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 BODY = "cf21"
 
 
@@ -82,7 +86,7 @@ def cameras() -> Iterator[Cameras]:
 
 def config(**values: Any) -> MocapConfig:
     # a busy machine delays frames: what is slow there is not lost
-    limits = {"lost_s": 0.3, "frozen_s": 0.3, "settle_s": 0.35}
+    limits = {"lost_s": 1.0, "frozen_s": 1.0, "settle_s": 1.05}
     return MocapConfig(**{"system": "simulator", "body": BODY, **limits, **values})
 
 
@@ -97,13 +101,13 @@ def test_optitrack_client_brings_poses_to_the_vehicle(cameras: Cameras) -> None:
         assert z == 1.0
         assert q == pytest.approx([0.0, 0.0, 0.6, 0.8])
     angles = [math.atan2(y, x) for x, y, *_ in sink.poses]
-    assert angles == sorted(angles)
+    assert all((b - a) % (2.0 * math.pi) < math.pi for a, b in itertools.pairwise(angles)), "in their order"
 
 
 @pytest.mark.parametrize(
     ("fault", "status", "text"),
     [
-        ("frozen", Status.FROZEN, "has not changed by a bit"),
+        ("frozen", Status.FROZEN, f"the pose of {BODY} has not changed by a bit"),
         ("occluded", Status.LOST, rf"{BODY} is not seen .*bodies that are: box"),
         ("silent", Status.SILENT, "no frame from simulator"),
     ],
@@ -112,72 +116,106 @@ def test_fault_is_named_and_passes(cameras: Cameras, fault: str, status: Status,
     with Mocap(config(), None, cameras.request) as mocap:
         mocap.wait_until_good()
         setattr(cameras, fault, True)
-        wait_for(lambda: mocap.state().status is status, f"status {status}")
-        with pytest.raises(LinkError, match=text):
+        wait_for(lambda: (s := mocap.state()).status is status and re.match(text, s.text), f"status {status}")
+        with pytest.raises(LinkError, match="motion capture: "):
             mocap.wait_until_good(timeout_s=0.0)
-        assert mocap.problems() == [f"motion capture: {mocap.state().text}"]
+        wait_for(lambda: [re.match(f"motion capture: {text}", p) is not None for p in mocap.problems()] == [True], text)
         setattr(cameras, fault, False)
         mocap.wait_until_good()
 
 
+class Heard:
+    """A guard that remembers: the thread of motion capture tells every state, however late this thread looks."""
+
+    def __init__(self) -> None:
+        self.states: list[tuple[Status, str]] = []
+
+    def look(self, status: Status, text: str, now_s: float) -> None:
+        assert text.startswith("motion capture: ")
+        assert now_s > 0
+        if self.statuses[-1:] != [status]:
+            self.states.append((status, text))
+
+    @property
+    def statuses(self) -> list[Status]:
+        return [status for status, _ in self.states]
+
+
 def test_jump_is_named_and_not_sent(cameras: Cameras) -> None:
-    sink = Sink()
-    with Mocap(config(lost_s=0.2, settle_s=1.0), sink, cameras.request) as mocap:
-        wait_for(lambda: mocap.state().status is Status.SETTLING, "settling")
-        mocap.wait_until_good()
+    sink, heard = Sink(), Heard()
+    with Mocap(config(settle_s=3.0), sink, cameras.request) as mocap:
+        mocap.guard = heard
+        wait_for(lambda: Status.GOOD in heard.statuses, "good")
         cameras.shift_m = 7.0
-        wait_for(lambda: mocap.state().status is Status.JUMPED, "jumped")
+        wait_for(lambda: heard.statuses[-1] is Status.JUMPED, "jumped")
         assert max(x for x, *_ in sink.poses) < 1.5
         assert mocap.state().counts.n_jumps == 1
 
 
 def test_guard_hears_each_status(cameras: Cameras) -> None:
-    heard: list[Status] = []
-
-    class Guard:
-        def look(self, status: Status, text: str, now_s: float) -> None:
-            assert text.startswith("motion capture: ")
-            assert now_s > 0
-            heard.append(status)
-
+    heard = Heard()
     with Mocap(config(), None, cameras.request) as mocap:
-        mocap.guard = Guard()
+        mocap.guard = heard
         mocap.wait_until_good()
         cameras.occluded = True
-        wait_for(lambda: heard[-1:] == [Status.LOST], "loss heard")
-    assert Status.GOOD in heard
+        wait_for(lambda: heard.statuses[-1] is Status.LOST, "loss heard")
+    assert heard.statuses[:2] in ([Status.CONNECTING, Status.SETTLING], [Status.SETTLING, Status.GOOD])
+    assert heard.statuses.index(Status.GOOD) < heard.statuses.index(Status.LOST)
 
 
-def test_send_rate_is_limited(cameras: Cameras) -> None:
+def test_send_rate_is_limited() -> None:
+    """Three seconds of frames at 100 Hz, told as fast as they can be."""
     sink = Sink()
-    with Mocap(config(send_hz=20.0), sink, cameras.request) as mocap:
-        mocap.wait_until_good()
-        before = mocap.state().counts.n_frames
-        wait_for(lambda: mocap.state().counts.n_frames >= before + 100, "frames")
-        n_frames = mocap.state().counts.n_frames
-    assert 10 <= len(sink.poses) <= n_frames / 4
+    mocap = Mocap(config(send_hz=20.0), sink)
+    for i in range(301):
+        mocap._send(5.0 + 0.01 * i, Pose((float(i), 0.0, 1.0), (0.0, 0.0, 0.0, 1.0)))
+    numbers = [x for x, *_ in sink.poses]
+    assert len(numbers) == pytest.approx(61, abs=1)
+    assert all(4 <= b - a <= 6 for a, b in itertools.pairwise(numbers[2:]))
 
 
 def test_closed_link_is_told_and_not_raised(cameras: Cameras) -> None:
     sink = Sink()
     sink.fails = True
-    with Mocap(config(rate_hz_min=1.0, jitter_ms_max=1000.0), sink, cameras.request) as mocap:
+    with Mocap(config(), sink, cameras.request) as mocap:
         mocap.wait_until_good()
-        wait_for(lambda: mocap.state().sink_error, "error")
-        assert "poses do not reach the vehicle: 'NoneType'" in mocap.problems()[0]
+        told = "motion capture: poses do not reach the vehicle: 'NoneType'"
+        wait_for(lambda: any(problem.startswith(told) for problem in mocap.problems()), "error")
         sink.fails = False
         wait_for(lambda: not mocap.state().sink_error, "no error")
 
 
 def test_process_that_dies_is_started_again(cameras: Cameras) -> None:
-    with Mocap(config(restart_s=0.6), None, cameras.request) as mocap:
+    heard = Heard()
+    with Mocap(config(restart_s=1.2), None, cameras.request) as mocap:
+        mocap.guard = heard
         mocap.wait_until_good()
         assert mocap._tracker is not None
         os.kill(mocap._tracker._process.pid, signal.SIGKILL)
-        wait_for(lambda: mocap.state().status is Status.FAILED, "failure")
-        assert "its client ended with signal 9" in mocap.state().text
-        wait_for(lambda: mocap.state().status is Status.GOOD, "good again")
-        assert mocap.state().n_restarts == 1
+        wait_for(lambda: Status.FAILED in heard.statuses, "failure")
+        failed = heard.statuses.index(Status.FAILED)
+        assert "its client ended with signal 9" in heard.states[failed][1]
+        wait_for(lambda: Status.GOOD in heard.statuses[failed:], "good again")
+        assert mocap.state().n_restarts >= 1
+
+
+def test_process_that_is_started_again_has_the_time_that_connecting_takes(cameras: Cameras) -> None:
+    """Also where that is longer than the silence after which it is started."""
+    heard = Heard()
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent,
+        Mocap(config(), None, cameras.request) as mocap,
+    ):
+        silent.bind(("127.0.0.1", 0))
+        mocap.guard = heard
+        mocap.wait_until_good()
+        options = {**cameras.request["options"], "port_command": str(silent.getsockname()[1])}
+        mocap._request = {"system": "optitrack", "options": options, "connect_s": 0.7}
+        mocap.config = config(restart_s=0.2)
+        assert mocap._tracker is not None
+        os.kill(mocap._tracker._process.pid, signal.SIGKILL)
+        whole = "no frame within 0.7 s"
+        wait_for(lambda: any(whole in text for _, text in heard.states), "the end of a client that was not cut short")
 
 
 def test_client_that_blocks_is_ended_in_time() -> None:
@@ -238,17 +276,32 @@ def _runs(pid: int) -> bool:
         return False
 
 
-def test_report_of_the_program(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.run(["mocap", "--config", "mock", "--seconds", "1.0", "--json"]) in (0, 1)
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> str:
+    """Configuration of a mock for a busy machine; the program's time begins when the pose is good."""
+    watch = mocap_cli._watch
+
+    def when_good(tracking: Mocap, *arguments: Any, **more: Any) -> None:
+        wait_for(lambda: tracking.state().status is Status.GOOD, "a good pose")
+        watch(tracking, *arguments, **more)
+
+    monkeypatch.setattr(mocap_cli, "_watch", when_good)
+    file = tmp_path / "mock.yaml"
+    file.write_text((Path(configs.__file__).parent / "mock.yaml").read_text() + "lost_s: 1.0\nsettle_s: 1.05\n")
+    return str(file)
+
+
+def test_report_of_the_program(patient: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["mocap", "--config", patient, "--seconds", "0.2", "--json"]) in (0, 1)
     report = json.loads(capsys.readouterr().out)
     assert report["status"] == "good"
     assert report["pose"]["q_WB"] == [0.0, 0.0, 0.0, 1.0]
-    assert report["n_frames"] > 30
+    assert report["n_frames"] > 10
     assert report["bodies"] == [BODY]
 
 
-def test_live_view_of_the_program(capsys: pytest.CaptureFixture[str]) -> None:
-    cli.run(["mocap", "--config", "mock", "--seconds", "0.4"])
+def test_live_view_of_the_program(patient: str, capsys: pytest.CaptureFixture[str]) -> None:
+    cli.run(["mocap", "--config", patient, "--seconds", "0.4"])
     view = capsys.readouterr().err
     for word in ("status", "position", "rate", "intervals", "bodies", BODY):
         assert word in view

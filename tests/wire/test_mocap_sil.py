@@ -7,16 +7,20 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from ivl import cli
+from ivl.cli import mocap as mocap_cli
 from ivl.errors import RolloutError
 from ivl.links import sil
+from ivl.links.deadlines import Deadlines
 from ivl.links.packets import Phase, Request
-from ivl.links.tables import Session
+from ivl.links.tables import LogBlock, Session
 from ivl.links.vehicle import Command, Vehicle
+from ivl.mocap import watch
 from ivl.mocap.config import MocapConfig
 from ivl.mocap.guard import LossGuard
 from ivl.mocap.simulated import SimulatedRoom
@@ -25,19 +29,39 @@ from ivl.mocap.watch import Status
 from ivl.silproc import SilProcess
 from ivl.world import World
 
-# a busy machine delays frames: what is slow there is not lost
-CONFIG = MocapConfig(system="simulator", body="cf21", lost_s=0.25, frozen_s=0.25, settle_s=0.3)
-# the vehicle itself may fly on its last pose for longer than that, so that it is the host who notices; and poses that a
-# busy machine delivers late look fast
+# A busy machine delays frames: what is slow there is not lost.  The vehicle lives slower than this machine, so that a
+# loss that the host notices after a second, and a second that poses need to settle, are short for it.
+CONFIG = MocapConfig(system="simulator", body="cf21", lost_s=1.0, frozen_s=1.0, settle_s=1.05)
+SPEED = 0.3
+# the vehicle itself may fly on its last pose, and without its host, for longer than that, so that it is the host who
+# notices; poses that a busy machine delivers late look fast; and a loss that begins with the flip is noticed in it
 LIMITS = {
     "ivl.speed_abort": 50.0,
     "ivl.stale_s_max": 1.0,
+    "ivl.host_s_max": 10.0,
+    "ivl.link_s_max": 10.0,
     "ivl.p_sigma_max": 10.0,
     "ivl.abort_hover_s": 0.3,
     "ivl.land_speed": 1.5,
-    "ivl.attached_s": 0.1,
+    "ivl.attached_s": 0.5,
 }
-DEADLINE_S = 20.0
+SLACK_M, SLACK_RAD = 0.3, 1.0
+"""Frames that come in a bunch seem to be microseconds apart: what the body moves between two of them is no jump."""
+DEADLINE_S = 60.0
+LOG_PERIOD_MS = 10
+
+
+class PhaseLog(LogBlock):
+    """Every phase that the vehicle's log tells, in the link's thread, however late the test's own thread looks."""
+
+    def __init__(self) -> None:
+        self.phases: list[Phase] = []
+        super().__init__(("ivl.phase",), LOG_PERIOD_MS)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        super().__setattr__(name, value)
+        if name == "values" and value and self.phases[-1:] != [value["ivl.phase"]]:
+            self.phases.append(Phase(value["ivl.phase"]))
 
 
 class Lab:
@@ -48,7 +72,8 @@ class Lab:
         self.room = SimulatedRoom(session, CONFIG.body)
         self.mocap = Mocap(CONFIG, session.cf.extpos, self.room.request(CONFIG))
         self.asked: list[str] = []
-        self.phases: list[Phase] = []
+        self.log = PhaseLog()
+        session.start_log(self.log)
         sil.reset(self.vehicle)
         self.vehicle.configure(World("habas2021", "wide_short", "as_simulated"))
         session.write(LIMITS)
@@ -61,13 +86,15 @@ class Lab:
         self.mocap.close()
         self.room.close()
 
-    def wait(self, condition: Callable[[], Any], what: str) -> None:
-        def seen() -> bool:
-            if not self.phases or self.phases[-1] != self.vehicle.phase:
-                self.phases.append(self.vehicle.phase)
-            return bool(condition())
+    @property
+    def phases(self) -> list[Phase]:
+        return self.log.phases
 
-        self.vehicle.wait(seen, DEADLINE_S, what, 0.02)
+    def wait(self, condition: Callable[[], Any], what: str) -> None:
+        self.vehicle.wait(lambda: bool(condition()), DEADLINE_S, what, 0.02)
+
+    def wait_for(self, phase: Phase) -> None:
+        self.wait(lambda: self.phases[-1:] == [phase] == [self.vehicle.phase], phase.name)
 
     def hover(self) -> LossGuard:
         """Reset into the air and hover under the flight core; returns the guard of this flight."""
@@ -78,14 +105,19 @@ class Lab:
         sil.reset(self.vehicle)
         self.wait(self.is_tracked, "cameras that have followed the reset")
         self.session.write({"sil.pose_source": 1})
-        self.vehicle.pause(0.15)
+        self.wait_for_poses()
         self.vehicle.put_policy(4.8, 8.0)
         self.asked.clear()
         guard = self.mocap.guard = LossGuard(lambda: self.vehicle.phase, self.abort)
-        self.vehicle.ask_for(Command(Request.HOVER, self.vehicle.position_W_m), (Phase.READY,), 5.0)
-        self.vehicle.pause(0.15)
+        self.vehicle.ask_for(Command(Request.HOVER, self.vehicle.position_W_m), (Phase.READY,), DEADLINE_S)
+        self.wait_for_poses()
+        self.wait_for(Phase.READY)
         self.phases.clear()
         return guard
+
+    def wait_for_poses(self) -> None:
+        before = self.process.get("sil.n_pose")
+        self.wait(lambda: self.process.get("sil.n_pose") >= before + 10, "poses in the vehicle")
 
     def is_tracked(self) -> bool:
         state, z_m = self.mocap.state(), self.process.get("simTruth.z")
@@ -106,7 +138,14 @@ class Lab:
 
 @pytest.fixture(scope="module")
 def lab() -> Iterator[Lab]:
-    with SilProcess(World("habas2021", "wide_short", "as_simulated")) as process, Session(process.uri) as session:
+    world = World("habas2021", "wide_short", "as_simulated")
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        SilProcess(world, speed=SPEED) as process,
+        Session(process.uri, Deadlines(answer_s=DEADLINE_S)) as session,
+    ):
+        patch.setattr(watch, "SLACK_M", SLACK_M)
+        patch.setattr(watch, "SLACK_RAD", SLACK_RAD)
         lab = Lab(process, session)
         yield lab
         lab.close()
@@ -115,7 +154,7 @@ def lab() -> Iterator[Lab]:
 def test_landing_flown_by_motion_capture(lab: Lab) -> None:
     guard = lab.hover()
     lab.approach(2.5)
-    lab.wait(lambda: lab.phases[-1] == Phase.DONE, "end of the landing")
+    lab.wait_for(Phase.DONE)
     assert Phase.FLIP in lab.phases
     snapshot = lab.vehicle.snapshot()
     assert snapshot.rrev_per_s >= 4.8
@@ -123,12 +162,14 @@ def test_landing_flown_by_motion_capture(lab: Lab) -> None:
     assert 1.0 < snapshot.vz_mps < 6.0
     assert lab.asked == []
     assert guard.n_aborts == 0
-    state = lab.mocap.state()
-    assert state.status is Status.GOOD
     # what was sent came out of the vehicle's log, through cameras and client, and is what the vehicle took
-    assert 0 < lab.process.get("sil.n_pose") <= state.n_sent
-    for axis, value in zip("xyz", state.pose.p_W_m, strict=True):
-        assert value == pytest.approx(lab.process.get(f"simTruth.{axis}"), abs=0.02)
+    assert 0 < lab.process.get("sil.n_pose") <= lab.mocap.state().n_sent
+
+    def is_seen_where_it_is() -> bool:
+        state, true_W_m = lab.mocap.state(), [lab.process.get(f"simTruth.{axis}") for axis in "xyz"]
+        return state.status is Status.GOOD and state.pose.p_W_m == pytest.approx(true_W_m, abs=0.02)
+
+    lab.wait(is_seen_where_it_is, "the pose of a vehicle that hangs at rest")
 
 
 @pytest.mark.parametrize(
@@ -143,7 +184,7 @@ def test_landing_flown_by_motion_capture(lab: Lab) -> None:
 def test_loss_in_hover_aborts(lab: Lab, fault: str, value: Any, text: str) -> None:
     guard = lab.hover()
     setattr(lab.room, fault, value)
-    lab.wait(lambda: lab.phases[-1] == Phase.ABORTED, "abort")
+    lab.wait_for(Phase.ABORTED)
     lab.mend()
     assert text in lab.asked[0]
     assert guard.n_aborts == 1
@@ -156,9 +197,9 @@ def test_loss_in_hover_aborts(lab: Lab, fault: str, value: Any, text: str) -> No
 def test_loss_in_the_approach_aborts(lab: Lab, fault: str) -> None:
     guard = lab.hover()
     lab.approach(0.8)
-    lab.wait(lambda: lab.phases[-1] == Phase.APPROACH, "approach")
+    lab.wait_for(Phase.APPROACH)
     setattr(lab.room, fault, True)
-    lab.wait(lambda: lab.phases[-1] == Phase.ABORTED, "abort")
+    lab.wait_for(Phase.ABORTED)
     lab.mend()
     assert guard.n_aborts == 1
     assert Phase.FLIP not in lab.phases
@@ -167,7 +208,7 @@ def test_loss_in_the_approach_aborts(lab: Lab, fault: str) -> None:
 def test_vehicle_comes_down_by_poses_that_are_back_in_time(lab: Lab) -> None:
     lab.hover()
     lab.room.occluded = True
-    lab.wait(lambda: lab.phases[-1] == Phase.ABORTED, "abort")
+    lab.wait_for(Phase.ABORTED)
     lab.mend()
     lab.wait(lambda: lab.vehicle.rule == "landed", "landing")
     assert lab.process.get("simTruth.z") == pytest.approx(0.0, abs=0.1)
@@ -178,9 +219,8 @@ def test_loss_in_the_flip_interrupts_nothing(lab: Lab) -> None:
     lab.approach(2.5)
     lab.wait(lambda: lab.vehicle.phase >= Phase.FLIP, "flip")
     lab.room.occluded = True
-    lab.wait(lambda: lab.phases[-1] == Phase.DONE, "end of the landing")
-    ended_s = time.monotonic()
-    lab.wait(lambda: time.monotonic() - ended_s > 0.2, "a while")
+    lab.wait_for(Phase.DONE)
+    lab.wait(lambda: guard.n_ignored, "the loss")
     lab.mend()
     assert lab.asked == []
     assert (guard.n_aborts, guard.n_ignored) == (0, 1)
@@ -189,13 +229,25 @@ def test_loss_in_the_flip_interrupts_nothing(lab: Lab) -> None:
     assert Phase.COAST in lab.phases
 
 
-def test_program_tracks_a_software_vehicle(capsys: pytest.CaptureFixture[str]) -> None:
+def test_program_tracks_a_software_vehicle(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    file = tmp_path / "room.yaml"
+    file.write_text("system: simulator\nbody: cf21\nlost_s: 1.0\nfrozen_s: 1.0\nsettle_s: 1.05\n")
     with SilProcess(World("crazyflie21")) as process:
-        cli.run(["mocap", "--config", "simulator", "--uri", process.uri, "--seconds", "1.0", "--json"])
+
+        def watch_until_sent(tracking: Mocap, seconds: float | None, quiet: bool) -> None:
+            assert (seconds, quiet) == (1.0, True)
+            end_s = time.monotonic() + DEADLINE_S
+            while process.get("sil.n_pose") <= 20 or tracking.state().status is not Status.GOOD:
+                assert time.monotonic() < end_s
+                time.sleep(0.05)
+
+        monkeypatch.setattr(mocap_cli, "_watch", watch_until_sent)
+        cli.run(["mocap", "--config", str(file), "--uri", process.uri, "--seconds", "1.0", "--json"])
         report = json.loads(capsys.readouterr().out)
         assert report["status"] == "good"
-        assert report["n_sent"] > 5
-        assert process.get("sil.n_pose") == pytest.approx(report["n_sent"], abs=20)
+        assert 20 < report["n_sent"] <= process.get("sil.n_pose")
         assert process.get("sil.pose_source") == 0
         assert process.get("stabilizer.estimator") == 2
         assert process.get("locSrv.extPosStdDev") == pytest.approx(0.01)

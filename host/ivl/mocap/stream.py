@@ -20,6 +20,8 @@ from ivl.mocap.tracker import Frame, Tracker, request_of
 from ivl.mocap.watch import Counts, Pose, Rates, Status, Watch, make_pose
 
 TICK_S = 0.01
+START_S = 5.0
+"""What starting the process may take on a busy machine, before its `connect_s` begins."""
 _EARLY = 0.25
 """Share of the sending period by which a pose may be sent early, so that jitter does not halve the rate."""
 
@@ -96,6 +98,7 @@ class Mocap:
         self._tracker: Tracker | None = None
         self._t_alive_s = self._t_due_s = -math.inf
         self._n_sent = self._n_restarts = 0
+        self._has_connected = False
         self._bodies: tuple[str, ...] = ()
         self._failure = self._sink_error = ""
 
@@ -133,12 +136,12 @@ class Mocap:
         """Return when the pose is good.
 
         Args:
-            timeout_s: Default: what the configuration gives for connecting, and a second.
+            timeout_s: Default: what the configuration gives for connecting, and the start of the process.
 
         Raises:
             LinkError: It is not within that time; the message says why.
         """
-        limit_s = self.config.connect_s + 1.0 if timeout_s is None else timeout_s
+        limit_s = self.config.connect_s + START_S if timeout_s is None else timeout_s
         end_s = time.monotonic() + limit_s
         while (state := self.state()).status is not Status.GOOD:
             if time.monotonic() >= end_s or (state.status is Status.FAILED and timeout_s is None):
@@ -203,12 +206,13 @@ class Mocap:
     def _restart_if_silent(self, now_s: float, has_frames: bool) -> None:
         assert self._tracker is not None
         if has_frames:
-            self._t_alive_s = now_s
-        has_had_any = self._watch.counts.n_frames > 0
-        limit_s = self.config.restart_s if has_had_any or self._failure else self.config.connect_s + 1.0
-        if now_s - self._t_alive_s > limit_s:
+            self._t_alive_s, self._has_connected = now_s, True
+        # one that has not brought a frame yet is ended by its own `connect_s`: cut short, it might never get there
+        is_over = self._has_connected or self._failure
+        if now_s - self._t_alive_s > (self.config.restart_s if is_over else self.config.connect_s + START_S):
             self._tracker.close()
             self._tracker, self._t_alive_s = Tracker(self._request), time.monotonic()
+            self._has_connected = False
             self._n_restarts += 1
 
     def _state(self, now_s: float) -> MocapState:
