@@ -2,6 +2,7 @@
 
 import asyncio
 import errno
+import functools
 import json
 import random
 import signal
@@ -21,15 +22,26 @@ from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
 from crtp_double import VALUES, Vehicle, value_of
 
-from ivl.can import link
+from ivl.can import gateway, link
 from ivl.can.dbc import Codec
 from ivl.can.gateway import Options, make_gateway
 from ivl.can.link import BusError
+from ivl.can.repeat import Repeater
 
-# cflib's thread of pings reads the link that is being closed: its error says nothing about ours
-pytestmark = pytest.mark.filterwarnings("ignore:Exception in thread ping_thread")
-DEADLINE_S = 20.0
-PROGRAM = [sys.executable, "-c", "from ivl.cli import main; main()", "can-gateway"]
+# cflib's threads read the link that is being closed: their errors say nothing about ours
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:Exception in thread ping_thread"),
+    pytest.mark.filterwarnings("ignore:Exception in thread IncomingPacketHandlerThread"),
+]
+DEADLINE_S = 60.0
+TIMEOUT_S, GIVEN_UP_S = 3.0, 60.0
+"""On a busy machine a thread may stand still for longer than a heartbeat may be late, and an answer for long."""
+PROGRAM = [
+    sys.executable,
+    "-c",
+    f"from ivl.can import link; link.TIMEOUT_S = {TIMEOUT_S}\nfrom ivl.cli import main; main()",
+    "can-gateway",
+]
 
 
 def wait_for(condition: Callable[[], Any], what: str) -> None:
@@ -47,8 +59,8 @@ def free_port() -> int:
 
 @pytest.fixture(autouse=True)
 def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a busy machine a thread may stand still for longer than a heartbeat may be late."""
-    monkeypatch.setattr(link, "TIMEOUT_S", 2.0)
+    monkeypatch.setattr(link, "TIMEOUT_S", TIMEOUT_S)
+    monkeypatch.setattr(gateway, "Repeater", functools.partial(Repeater, limit_s=GIVEN_UP_S))
 
 
 class LossyBus(VirtualBus):
@@ -147,12 +159,14 @@ class Client:
         assert self.fully.wait(DEADLINE_S), "never fully connected"
 
     def close(self) -> None:
-        """Close; its two threads look once a second whether they are to end, and are helped to see it now."""
+        """Close; its threads look once a second whether they are to end, and are helped to see it now."""
         link = self.cf.link
         if link is not None:
             link.socket.settimeout(0.05)
             self.cf.incoming.stop()
             link.in_queue.put(None)
+            self.cf.incoming.join(DEADLINE_S)
+        self.cf.link_statistics.stop()
         self.cf.close_link()
 
     def set(self, name: str, value: float) -> None:

@@ -1,14 +1,16 @@
 """Learning's own way to fly, over a CAN bus that loses frames, against the simulator in this process."""
 
+import functools
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from test_can_gateway import End, LossyBus, free_port, wait_for
+from test_can_gateway import GIVEN_UP_S, TIMEOUT_S, End, LossyBus, free_port, wait_for
 
 from ivl import experiment
-from ivl.can import link
+from ivl.can import gateway, link
 from ivl.can.gateway import Options
+from ivl.can.repeat import Repeater
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.silproc import SilProcess
 from ivl.source import Plan, WorldSource
@@ -16,8 +18,8 @@ from ivl.source import Plan, WorldSource
 
 @pytest.fixture(autouse=True)
 def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a busy machine a thread may stand still for longer than a heartbeat may be late."""
-    monkeypatch.setattr(link, "TIMEOUT_S", 2.0)
+    monkeypatch.setattr(link, "TIMEOUT_S", TIMEOUT_S)
+    monkeypatch.setattr(gateway, "Repeater", functools.partial(Repeater, limit_s=GIVEN_UP_S))
 
 
 @pytest.fixture

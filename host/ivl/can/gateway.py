@@ -20,6 +20,8 @@ from ivl.can.telemetry import Telemetry
 
 TICK_S = 0.01
 TELEMETRY_S = 0.05
+STOP_S = 10.0
+"""The thread that reads a bus without a file ends within 0.1 s, on a busy machine later; it must not outlive the loop."""
 PACKET_MAX = 31
 _SCAN = b"\xff"
 """A packet without a port that cflib sends to find vehicles; whoever sends it is no client yet."""
@@ -82,7 +84,7 @@ class Gateway(ABC, asyncio.DatagramProtocol):
             ticking.cancel()
             with contextlib.suppress(asyncio.CancelledError, BusError, OSError):
                 await ticking
-            notifier.stop(timeout=1.0)
+            notifier.stop(timeout=STOP_S)
             self._close()
             with contextlib.suppress(BusError):
                 self._link.say(State.STOPPED, self.n_repeated, time.monotonic())
