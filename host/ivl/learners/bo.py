@@ -5,9 +5,12 @@ the start's spread, z = (theta - mu0) / sigma0, with y the returns shifted and s
 
     first episode     theta ~ N(mu0, diag sigma0^2), truncated to the bounds                             (1)
     model             y = f(z) + noise, f a Gaussian process (see `ivl.learners.gp`), refitted after each episode:
-                      its lengths and noise ratio are searched up to `settled` rollouts, then followed
+                      its lengths and noise ratio are searched up to `settled` rollouts, then followed; they are
+                      searched again while a return has reached `aim` and the model expects that of no policy
     later episodes    theta_n = argmax over the candidates of f_n, f_n a draw of the posterior           (2)
-    before success    while no return has reached `aim`, a share of an episode goes where the box is emptiest
+    before success    while fewer than `enough` returns reach `aim`, a share of an episode explores:
+                      theta_i = argmax over the box of (calm + contrast(z)) distance(z)                  (4)
+    after it          only a share of the draws of (2) is sought in the whole box, the others near what was best
     recommended       argmax(mean(z) - caution sd(z))                                                    (3)
 
 Candidates are uniform in the box and normal about the best remembered policies and the recommended one, spread by a
@@ -18,7 +21,12 @@ noise explains that by ever shorter lengths, until it takes every lone landing f
 
 Returns alone lead to the nearest shelf: for many approaches flips that are far too early score better than misses, and
 a landing is a narrow ridge at the shelf's foot. What no return has shown, a model of the returns cannot expect; hence
-`aim`, below which the search does not settle.
+`aim`, below which the search does not settle. Exploring goes where the box is empty and where neighbouring policies
+differ in their returns: the distance of (4) is that to the nearest policy flown, in widths of the box, and contrast is
+the range of the returns of the `n_nearest` policies, as a share of the range of all. (The idea, to weigh empty space
+with local variation, is that of LOLA-Voronoi designs: Crombecq et al., SIAM J. Sci. Comput. 33, 2011.) A landing lies
+between too early and too late, which the returns tell apart by a step, and mostly at large moments: hence `margin`, by
+which candidates overshoot the box and are moved onto its bounds.
 """
 
 from collections.abc import Mapping
@@ -30,7 +38,7 @@ from pydantic import Field, model_validator
 from ivl.learners.base import FloatArray, Learner, Meta, Options, draw_truncated
 from ivl.learners.gp import GaussianProcess, Hyper, fit
 
-_SEARCH_ROUNDS = 4
+_SEARCH_ROUNDS = 3
 
 
 class BOOptions(Options):
@@ -43,9 +51,14 @@ class BOOptions(Options):
     n_uniform: int = Field(default=400, ge=10, le=5000, description="candidates over the whole box")
     n_near: int = Field(default=300, ge=10, le=5000, description="candidates near what was best")
     n_elite: int = Field(default=20, ge=1, le=1000, description="policies that count as best")
-    jitter: float = Field(default=0.25, gt=0, le=10, description="spread of the near candidates, in kernel lengths")
-    aim: float = Field(default=75.0, ge=0, description="return that is worth settling for: a landing with body contact")
+    jitter: float = Field(default=0.5, gt=0, le=10, description="spread of the near candidates, in kernel lengths")
+    aim: float = Field(default=85.0, ge=0, description="return worth settling for: four feet, even with body contact")
     spread: float = Field(default=0.75, ge=0, le=1, description="share of an episode that explores before that")
+    enough: int = Field(default=4, ge=1, le=1000, description="returns that must reach the aim to end that exploration")
+    roam: float = Field(default=0.25, ge=0, le=1, description="share of an episode that seeks the whole box after that")
+    calm: float = Field(default=0.1, gt=0, le=10, description="weight of exploring where the returns around agree")
+    n_nearest: int = Field(default=4, ge=2, le=100, description="neighbours whose returns are compared for that")
+    margin: float = Field(default=0.2, ge=0, le=1, description="exploring overshoots the box by so many of its widths")
     settled: int = Field(default=32, ge=0, le=4000, description="rollouts from which on a fit follows the one before")
     memory: int = Field(default=400, ge=8, le=4000, description="latest rollouts that the model is made from")
 
@@ -71,29 +84,36 @@ class BOLearner(Learner):
         self._hyper = self._prior
         self._gp: GaussianProcess | None = None
         self._best = np.zeros(self.dim)
+        self._expected = -np.inf
         self._spread = self.sigma0.copy()
 
     def _ask(self, n: int) -> FloatArray:
         if self._gp is None:
             return draw_truncated(self._rng, self.mu0, self.sigma0, self.lo, self.hi, n)  # (1)
         candidates = self._candidates(self._gp)
-        n_far = round(self.options.spread * n) if self._rewards.max() < self.options.aim else 0
-        chosen = candidates[self._gp.sample(candidates, n - n_far, self._rng).argmax(axis=1)]  # (2)
-        theta = self._unscale(np.vstack([chosen, self._farthest(n_far, np.vstack([self._x, chosen]))]))
+        settles = np.count_nonzero(self._rewards >= self.options.aim) >= self.options.enough
+        n_far = 0 if settles else round(self.options.spread * n)
+        drawn = self._gp.sample(candidates, n - n_far, self._rng)
+        if settles:
+            drawn[round(self.options.roam * n) :, : self.options.n_uniform] = -np.inf
+        chosen = candidates[drawn.argmax(axis=1)]  # (2)
+        theta = self._unscale(np.vstack([chosen, self._explore(n_far, chosen)]))
         self._spread = np.asarray(theta.std(axis=0))
         return theta
 
     def _update(self, theta: FloatArray, rewards: FloatArray, _meta: Meta, /) -> None:
         self._x = np.vstack([self._x, self._scale(theta)])[-self.options.memory :]
         self._rewards = np.append(self._rewards, rewards)[-self.options.memory :]
-        follow = len(self._x) > self.options.settled
+        doubted = self._expected < self.options.aim <= self._rewards.max()
+        follow = len(self._x) > self.options.settled and not doubted
         self._hyper = fit(self._x, self._values(), self._prior, self._hyper, self.options.noise_min, follow)
         self._refresh()
 
     def _refresh(self) -> None:
-        """Posterior and recommendation from data and hyper-parameters."""
+        """Posterior, recommendation and largest expected return of a flown policy, from data and hyper-parameters."""
         self._gp = GaussianProcess(self._x, self._values(), self._hyper)
         self._best = self._safest(self._gp)
+        self._expected = float(self._rewards.mean() + self._rewards.std() * self._gp.fitted.max())
 
     def _values(self) -> FloatArray:
         """Returns, standardised; all equal gives zeros."""
@@ -109,16 +129,33 @@ class BOLearner(Learner):
         near = self._cloud(centers[chosen], self.options.n_near, 1.0, self._rng)
         return np.vstack([uniform, near])
 
-    def _farthest(self, n: int, taken: FloatArray) -> FloatArray:
-        """Points of the box, each as far as can be from all before it; distances in widths of the box."""
-        width = self._box[1] - self._box[0]
-        points = self._uniform(self.options.n_uniform, self._rng) if n else np.empty((0, self.dim))
-        gap = (((points[:, None] - taken) / width) ** 2).sum(axis=-1).min(axis=1, initial=np.inf)
-        far = np.empty((n, self.dim))
+    def _explore(self, n: int, chosen: FloatArray) -> FloatArray:
+        """N points of the box, each with the largest weighted distance to the nearest one flown or taken before.
+
+        Distances are in widths of the box. The weight is `calm` plus the contrast of the returns around the point.
+        """
+        if not n:
+            return np.empty((0, self.dim))
+        margin = self.options.margin * (self._box[1] - self._box[0])
+        points = self._uniform(self.options.n_uniform, self._rng, margin)
+        square = self._square_distances(points, self._x)
+        weight = (self.options.calm + self._contrast(square)) ** 2
+        gap = np.hstack([square, self._square_distances(points, chosen)]).min(axis=1)
+        taken = np.empty((n, self.dim))
         for i in range(n):
-            far[i] = points[gap.argmax()]
-            gap = np.minimum(gap, (((points - far[i]) / width) ** 2).sum(axis=-1))
-        return far
+            taken[i] = points[(gap * weight).argmax()]
+            gap = np.minimum(gap, self._square_distances(points, taken[i, None])[:, 0])
+        return taken
+
+    def _contrast(self, square: FloatArray) -> FloatArray:
+        """Range of the returns of the nearest policies as a share of that of all; `square` has one row per point."""
+        k, whole = min(self.options.n_nearest, square.shape[1]), np.ptp(self._rewards)
+        nearest = np.argpartition(square, k - 1, axis=1)[:, :k]
+        return np.asarray(np.ptp(self._rewards[nearest], axis=1) / whole) if whole > 0 else np.zeros(len(square))
+
+    def _square_distances(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        u, v = a / (self._box[1] - self._box[0]), b / (self._box[1] - self._box[0])
+        return np.asarray(sum((u[:, [axis]] - v[:, axis]) ** 2 for axis in range(self.dim)))
 
     def _safest(self, gp: GaussianProcess) -> FloatArray:
         """Equation (3).
@@ -126,15 +163,17 @@ class BOLearner(Learner):
         The search has its own fixed generator, so that reading a result never shifts the next draw.
         """
         rng = np.random.Generator(np.random.PCG64(self.seed))
-        points = np.vstack([self._x, self._uniform(500, rng)])
+        points = np.vstack([self._x, self._uniform(300, rng)])
         for halvings in range(_SEARCH_ROUNDS + 1):
             best = points[gp.safest(points, self.options.caution)]
             if halvings < _SEARCH_ROUNDS:
-                points = np.concatenate([best[None], self._cloud(best, 150, 0.5**halvings, rng)])
+                points = np.concatenate([best[None], self._cloud(best, 120, 0.5**halvings, rng)])
         return np.asarray(best)
 
-    def _uniform(self, n: int, rng: np.random.Generator) -> FloatArray:
-        return rng.uniform(self._box[0], self._box[1], (n, self.dim))
+    def _uniform(self, n: int, rng: np.random.Generator, margin: FloatArray | float = 0.0) -> FloatArray:
+        """Draw n points of the box, those that fall into a margin around it moved onto its bounds."""
+        drawn = rng.uniform(self._box[0] - margin, self._box[1] + margin, (n, self.dim))
+        return np.asarray(np.clip(drawn, self._box[0], self._box[1]))
 
     def _cloud(self, centers: FloatArray, n: int, share: float, rng: np.random.Generator) -> FloatArray:
         """Draw n normal points, about one centre or each its own, `share` of the jitter wide, moved into the box."""
