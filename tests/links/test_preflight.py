@@ -117,6 +117,7 @@ def test_fly_prints_snapshot_and_outcome_and_writes_the_recorder(
         (["fly", "--uri", "udp://127.0.0.1:9", "--rrev", "4", "--moment", "8"], 1, "nobody listens there"),
         (["learn", "experiments/paper_vertical.yaml", "--uri", "radio://0/80/2M/E7E7E7E7E7"], 1, "no Crazyradio"),
         (["doctor", "--uri", "http://x"], 2, "names no link"),
+        (["doctor", "--uri", "serial://nowhere"], 1, "there is no such serial port"),
     ],
 )
 def test_missing_link_is_one_line_and_an_exit_code(

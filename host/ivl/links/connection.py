@@ -5,10 +5,10 @@ repeated until they are answered. What is asked is in `ivl.links.tables`.
 """
 
 import contextlib
+import io
 import os
 import queue
 import struct
-import sys
 import threading
 import time
 from collections import deque
@@ -88,7 +88,7 @@ class Connection:
     def _connect(self) -> None:
         began_s = time.monotonic()
         self.cf.packet_received.add_callback(self._on_packet)
-        with contextlib.redirect_stdout(sys.stderr):  # cflib prints on some kinds of link
+        with contextlib.redirect_stdout(io.StringIO()):  # cflib prints on some kinds of link
             self.cf.open(self.uri)
         next_ask_s = began_s + self.deadlines.retry_s
         while not self.cf.tables_known.wait(0.02):
@@ -306,9 +306,9 @@ def check_uri(uri: str) -> None:
     if not separator or scheme not in SCHEMES or not rest:
         examples = "udp://127.0.0.1:19850, radio://0/80/2M/E7E7E7E7E7, usb://0, tcp://host:5000, serial://name"
         raise ConfigError(f"uri: value {uri!r} names no link (allowed such as {examples})")
-    port = rest.rpartition(":")[2]
-    if scheme in ("udp", "tcp") and not (":" in rest and port.isdigit() and 0 < int(port) < 65536):
-        raise ConfigError(f"uri: value {uri!r} has no port (expected {scheme}://HOST:PORT with a port 1 .. 65535)")
+    host, _, port = rest.rpartition(":")
+    if scheme in ("udp", "tcp") and not (host and port.isdigit() and 0 < int(port) < 65536):
+        raise ConfigError(f"uri: value {uri!r} is not {scheme}://HOST:PORT with a port 1 .. 65535")
 
 
 def _explain(uri: str, text: str) -> str:
@@ -319,6 +319,8 @@ def _explain(uri: str, text: str) -> str:
         return "no Crazyflie is plugged in"
     if "Connection refused" in text:
         return f"nobody listens there ({_WHO_IS_ASKED[uri.partition('://')[0]]})"
+    if "Could not identify device" in text:
+        return "there is no such serial port"
     if text.startswith("No driver found"):
         return "the URI is malformed"
     return text
