@@ -8,6 +8,7 @@ the link touches, tests and hosts read and write parameters, inject faults and f
             ...
 """
 
+import contextlib
 import os
 import re
 import socket
@@ -26,7 +27,7 @@ from ivl.world import World
 
 SERVER_ENV = "IVL_NATIVE_SERVER"  # another build of the program, for example one with sanitizers
 DEFAULT_SERVER = Path(native.__file__).parent / "_native" / "ivl_sil"
-_STARTED_S, _STOPPED_S, _CONTROL_S = 20.0, 5.0, 2.0
+_STARTED_S, _STOPPED_S, _CONTROL_S = 60.0, 20.0, 20.0  # of use only when something is broken: a busy machine is none
 _ANNOUNCED = re.compile(r"vehicle (\d+): (udp://\S+:(\d+)) control (\S+):(\d+)\n")
 
 
@@ -193,7 +194,8 @@ class SilProcess:
         words = self._last_words() if code not in (0, -9) else ""
         for stream in (process.stdin, process.stdout, self._errors):
             if stream is not None:
-                stream.close()
+                with contextlib.suppress(BrokenPipeError):  # what it did not read
+                    stream.close()
         self._errors = None
         if ask and code != 0:
             raise LinkError(f"ivl_sil ended with code {code}: {words}")

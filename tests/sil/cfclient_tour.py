@@ -16,7 +16,7 @@ from cfclient.ui.main import MainUI
 from PyQt6.QtCore import QObject
 from PyQt6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLineEdit, QProgressBar, QWidget
 
-STEP_S = 30.0  # deadline of each step, for a slow machine
+STEP_S = 90.0  # deadline of each step, for a slow machine
 T = TypeVar("T", bound=QObject)
 
 
@@ -62,13 +62,15 @@ class Tour:
         self.wait(f"{name} can be clicked", button.isEnabled)
         button.click()
 
-    def seen(self, name: str, seconds: float) -> list[str]:
-        """The different texts that a field showed."""
+    def seen(self, name: str, n: int) -> list[str]:
+        """The first n different texts that a field showed."""
         texts: set[str] = set()
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            self.live(0.05)
+
+        def look() -> bool:
             texts.add(self.text(name))
+            return len(texts) >= n
+
+        self.wait(f"{n} texts of {name}", look)
         return sorted(texts)
 
 
@@ -98,7 +100,7 @@ def fly(tour: Tour, picture: Path) -> dict[str, object]:
     tour.wait("flying", lambda: tour.text("_supervisor_state") == "Flying")
     tour.wait("half a metre up", lambda: tour.number("estimateZ") > 0.45)
     tour.click("commanderForwardButton")
-    shown["pitch_shown"] = tour.seen("estimatePitch", 2.0)
+    shown["pitch_shown"] = tour.seen("estimatePitch", 6)
     shown["motor"] = tour.find(QProgressBar, "actualM1").value()
     shown["height_hovering_m"] = tour.number("estimateZ")
     tour.wait("the battery sinks", lambda: tour.number("_aff_volts") < float(str(shown["volts_waiting"])))

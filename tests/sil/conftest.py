@@ -15,7 +15,7 @@ from cflib.crazyflie import Crazyflie
 from ivl.silproc import SilProcess
 from ivl.world import World
 
-DEADLINE_S = 20.0  # for a machine that is busy; nothing is judged by it
+DEADLINE_S = 60.0  # for a machine that is busy; nothing is judged by it
 
 
 def wait_for(what: str, condition: Callable[[], Any]) -> Any:
@@ -41,7 +41,22 @@ def connected(uri: str, parameters: bool = True) -> Iterator[Crazyflie]:
         assert not failed
         yield cf
     finally:
-        cf.close_link()
+        close(cf)
+
+
+def close(cf: Crazyflie) -> None:
+    """Close; its threads look once a second whether they are to end, and are helped to see it now.
+
+    They end before the link is taken from under them, or one of them would trip over it now and then.
+    """
+    link = cf.link
+    if link is not None:
+        link.socket.settimeout(0.05)
+        cf.incoming.stop()
+        link.in_queue.put(None)
+        cf.incoming.join(DEADLINE_S)
+    cf.link_statistics.stop()
+    cf.close_link()
 
 
 class Raw:
@@ -77,16 +92,19 @@ class Raw:
             if reply[0] & 0xF3 == request[0] & 0xF3:
                 return reply
 
+    def come(self) -> list[bytes]:
+        """What has come by now and was not read yet."""
+        packets = []
+        self.socket.setblocking(False)
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                packets.append(self.socket.recv(100))
+        self.socket.settimeout(DEADLINE_S)
+        return packets
+
     def silent(self) -> bool:
         """Nothing has come."""
-        self.socket.setblocking(False)
-        try:
-            self.socket.recv(100)
-        except BlockingIOError:
-            return True
-        finally:
-            self.socket.settimeout(DEADLINE_S)
-        return False
+        return not self.come()
 
     def connect(self) -> None:
         """The packets with which cflib begins, tables left out."""
@@ -95,7 +113,7 @@ class Raw:
         assert self.ask("5d05") == bytes.fromhex("5d050000")
         n_logs, *_ = struct.unpack("<HIBB", self.ask("5c03")[2:])
         assert len(self.ask(b"\x5c\x02" + struct.pack("<H", n_logs - 1))) > 6
-        assert self.ask("4c01")[2] == 2
+        assert self.ask("4c01")[2] == 3
         assert len(self.ask("4c0201")) == 16
         n_params, _ = struct.unpack("<HI", self.ask("2c03")[2:])
         assert len(self.ask(b"\x2c\x02" + struct.pack("<H", n_params - 1))) > 6

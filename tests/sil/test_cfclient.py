@@ -38,7 +38,7 @@ def test_cfclient_connects_shows_arms_and_flies(waiting, tmp_path):
         "SCAN_ADDRESS": host,
     }
     command = [sys.executable, str(TOUR), sil.uri, str(picture)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=900, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     shown = json.loads(picture.with_suffix(".json").read_text(encoding="utf-8"))
     assert shown["arm_before"] == "Arm"

@@ -17,7 +17,7 @@ from ivl.world import World
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
     """The program, which ends by itself."""
-    return subprocess.run([silproc.server_path(), *arguments], capture_output=True, text=True, timeout=20, check=False)
+    return subprocess.run([silproc.server_path(), *arguments], capture_output=True, text=True, timeout=60, check=False)
 
 
 def test_help_teaches():
@@ -86,7 +86,7 @@ def test_command_becomes_the_program(tmp_path):
         assert re.fullmatch(r"vehicle 0: udp://127\.0\.0\.1:\d+\n", run.stdout.readline())
         assert Path(f"/proc/{run.pid}/exe").resolve() == silproc.server_path()
         run.send_signal(signal.SIGINT)
-        assert run.wait(20) == 0
+        assert run.wait(60) == 0
         assert "crazyflie21 with gear wide_long of table1" in run.stderr.read()
 
 

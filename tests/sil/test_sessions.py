@@ -33,12 +33,14 @@ def test_a_second_client_cannot_take_a_vehicle_that_is_flown(sil, Raw, wait_for)
         client.connect()
         host, port = client.socket.getsockname()
         for packet in ("9d03", "8c0300", "5d05", "2e0000ff", "3c" + "00" * 14):
+            client.ask("fc00")  # who is silent for a second is no client any more
             other.send(packet)
         wait_for("all to be seen", lambda: sil.get("sil.n_foreign") == 5)
         assert other.silent()
         assert client.ask("fc0011") == bytes.fromhex("fc0011")
         assert not int(sil.get("supervisor.info")) & 64
         # a request to connect is told who flies, and waits; nothing is answered as long as the client lives
+        client.ask("fc00")
         other.send("fd00")
         assert other.receive() == f"\x0cBusy: {host}:{port}\n".encode()
         for _ in range(20):
@@ -56,28 +58,28 @@ def test_who_asked_is_next_as_soon_as_the_client_has_closed_his_socket(sil, Raw)
         other.connect()
 
 
-def test_who_asked_is_next_when_the_client_has_been_silent(sil, Raw):
+def test_who_asked_is_next_when_the_client_has_been_silent(sil, Raw, wait_for):
     with Raw(sil.uri) as client, Raw(sil.uri) as other:
         client.connect()
         assert other.ask("fd00")[1:9] == b"Bitcraze"
-        client.send("fd00")
-        while not client.receive().startswith(b"\x0cBusy"):
-            pass
+
+        def is_told() -> bool:
+            other.send("fc00")  # still there
+            client.send("fd00")
+            return client.receive().startswith(b"\x0cBusy")
+
+        wait_for("the answer to one who comes too late", is_told)
 
 
 def test_log_blocks_go_with_a_silent_client(sil, Raw, wait_for):
-    with Raw(sil.uri) as client:
+    with Raw(sil.uri) as client, Raw(sil.uri) as other:
         client.connect()
         client.ask("5d0601010000")
         client.ask("5d030101")
         wait_for("a data packet", lambda: client.receive()[0] & 0xF3 == 0x52)
-        # the client does not speak for a second: the stream ends
-        client.socket.settimeout(0.3)
-        with contextlib.suppress(TimeoutError):
-            while True:
-                client.receive()
-        client.socket.settimeout(5.0)
-        assert client.ask("5d030101") == bytes.fromhex("5d030102")
+        # the client does not speak for a second: then the vehicle is another's, and there is no such block
+        assert other.ask("fd00")[1:9] == b"Bitcraze"
+        assert other.ask("5d030101") == bytes.fromhex("5d030102")
 
 
 def test_eight_vehicles_at_once(world, connected):
@@ -93,7 +95,6 @@ def test_eight_vehicles_at_once(world, connected):
                 cf.loc.send_extpos([0.0, 0.0, float(n)])
             assert [cf.state for cf in flown] == [2] * 8
             assert {sil.get("sil.n_bad", n) for n in range(8)} == {0}
-            list(pool.map(lambda cf: cf.close_link(), flown))
 
 
 def test_a_thousand_connections_leave_nothing_behind(fast, Raw):
@@ -110,6 +111,6 @@ def test_a_thousand_connections_leave_nothing_behind(fast, Raw):
     cycle(1000)
     assert files_and_memory_kB(fast.pid)[0] == server[0]
     assert files_and_memory_kB(fast.pid)[1] - server[1] < 200
-    assert files_and_memory_kB(os.getpid())[0] == own[0]
+    assert files_and_memory_kB(os.getpid())[0] <= own[0]  # what earlier tests left may be closed by now
     assert files_and_memory_kB(os.getpid())[1] - own[1] < 5000
     assert fast.get("sil.n_rx") >= 1050 * 13
