@@ -8,6 +8,7 @@ again: nothing is scored wrongly, and nothing is lost.
 import json
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,7 @@ class CrazyflieSource:
         """Flights that were not scored and were flown again."""
         self.warnings: list[str] = []
         """What a reader of the results has to know."""
+        self._folder: Path | None = None  # it may not be there before the first flight that counts
         self._connect()
         try:
             if self._is_sil and not self.warnings and not self._has_our_bits():
@@ -72,6 +74,7 @@ class CrazyflieSource:
         except BaseException:
             self.close()
             raise
+        self._folder = self.options.folder
 
     def _compare_worlds(self, session: Session) -> None:
         """With each connection, since a vehicle may have been started anew, and otherwise."""
@@ -94,7 +97,7 @@ class CrazyflieSource:
         probe = Rollout(policy.rrev_c_per_s.mu0, policy.moment_y_Nmm.mu0)
         spec = (self._experiment.speed_mps, self._experiment.angle_deg, probe.rrev_c_per_s, probe.moment_y_Nmm)
         here = self.world.rollouts(*spec, seed=0, stream=0, start=self._experiment.start, threads=1)
-        there = self._fly_until_known(np.zeros(1, dtype=np.intp), probe, is_probe=True)
+        there = self._fly_until_known(np.zeros(1, dtype=np.intp), probe)
         return there.outcomes.tobytes() == here.tobytes()
 
     # ---- RolloutSource
@@ -140,17 +143,14 @@ class CrazyflieSource:
             raise LinkError(f"{self.uri}: the link is closed")
         return Episode(vehicle, self._experiment).fly(field, rollout)
 
-    def _fly_until_known(
-        self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout, is_probe: bool = False
-    ) -> Flown:
+    def _fly_until_known(self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout) -> Flown:
         for attempt in range(1, ATTEMPTS_MAX + 1):
             try:
                 if self._vehicle is None:
                     self._return()
                 landing = self.fly_one(rollout)
                 outcome = landing.outcome
-                if not is_probe:
-                    self._keep(landing)
+                self._keep(landing)
                 good = bool(valid(outcome).all())
                 reason = "" if good else f"simulation: {self.world.end_reason(int(outcome['end_reason'][0]))}"
                 return Flown(index, outcome, reason)
@@ -295,7 +295,7 @@ class CrazyflieSource:
         self._note(landing.rollout, "flown", landing)
         if not self._is_sil:
             self.options.say(f"flown: {int(landing.outcome['n_legs'][0])} legs hold, battery {landing.battery_V:.2f} V")
-        folder = self.options.folder
+        folder = self._folder
         if folder is not None and landing.recording is not None:
             (folder / RECORDINGS).mkdir(exist_ok=True)
             name = f"{landing.rollout.seed:016x}-{landing.rollout.stream}.csv"
@@ -303,7 +303,7 @@ class CrazyflieSource:
 
     def _note(self, rollout: Rollout, what: str, landing: Landing | None = None) -> None:
         """One line of JSON per flight, on the disk before the next begins."""
-        folder = self.options.folder
+        folder = self._folder
         if folder is None:
             return
         line: dict[str, Any] = {
