@@ -106,6 +106,12 @@ def list_gears(gear_set: str) -> list[str]:
     return list(_designs(yamlfile.read(_locate(gear_set, GEARS_DIR, "gear set")), gear_set))
 
 
+def gear_title(gear: str) -> str:
+    """Name of a landing gear as the paper writes it: Wide-Short for wide_short."""
+    *width, length = (word.capitalize() for word in gear.split("_"))
+    return f"{' '.join(width)}-{length}" if width else length
+
+
 def load_vehicle(name_or_path: str, table: Table | None = None) -> Part:
     """Read and check a vehicle.
 

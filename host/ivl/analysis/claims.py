@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
+from ivl import model
 from ivl.analysis import region
 from ivl.analysis.contact import contact_order
 from ivl.analysis.intervals import Estimate, difference
@@ -137,7 +138,8 @@ def _one_region(trials: pd.DataFrame) -> Found:
     worst = min(parts, key=lambda g: parts[g].largest_share)
     lowest = min(aucs, key=lambda g: aucs[g].value)
     finding = (
-        f"AUC in (Vx, Vz, d) is {show(aucs[lowest])} in the worst gear ({lowest}); the largest connected part holds "
+        f"AUC in (Vx, Vz, d) is {show(aucs[lowest])} in the worst gear ({model.gear_title(lowest)}); "
+        "the largest connected part holds "
         f"{100 * parts[worst].largest_share:.0f} % of the solved cells or more, with at most "
         f"{max(p.n_holes for p in parts.values())} unsolved cells enclosed. The region is open towards 4 m/s, where "
         "the sweep ends."
@@ -211,7 +213,7 @@ def _fast_is_best(trials: pd.DataFrame) -> Found:
     least = min(gain, key=lambda g: gain[g].value)
     finding = (
         f"Above {SLOW_UP_TO_MPS:g} m/s the landing rate is higher by {show(gain[least])} in the gear that gains least "
-        f"({least}); the best speed of a gear is {min(best.values()):g} m/s at least."
+        f"({model.gear_title(least)}); the best speed of a gear is {min(best.values()):g} m/s at least."
     )
     return verdict, finding, {**{f"gain_{g}_norm": gain[g] for g in gain}, **{f"best_{g}_mps": best[g] for g in best}}
 
@@ -267,7 +269,8 @@ def _fore_legs_first(trials: pd.DataFrame) -> Found:
     swing = min(order, key=lambda g: order[g].swing_completed.value)
     finding = (
         f"In solved trials a fore leg sticks first in {show(order[first].fore_first)} of the rollouts in the worst "
-        f"gear ({first}), and a hind leg follows in {show(order[swing].swing_completed)} of those ({swing})."
+        f"gear ({model.gear_title(first)}), and a hind leg follows in {show(order[swing].swing_completed)} of those "
+        f"({model.gear_title(swing)})."
     )
     return verdict, finding, {
         **{f"fore_first_{g}_norm": o.fore_first for g, o in order.items()},

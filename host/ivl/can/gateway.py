@@ -21,7 +21,7 @@ from ivl.can.telemetry import Telemetry
 TICK_S = 0.01
 TELEMETRY_S = 0.05
 STOP_S = 10.0
-"""The thread that reads a bus ends within 0.1 s, on a busy machine later; it must not outlive the loop."""
+"""A thread that reads a bus without a file ends within 0.1 s, on a busy machine later; it must not outlive the loop."""
 PACKET_MAX = 31
 _SCAN = b"\xff"
 """A packet without a port that cflib sends to find vehicles; whoever sends it is no client yet."""

@@ -108,14 +108,8 @@ def words(trials: pd.DataFrame, column: str) -> str:
     """The values of a column as a reader would say them."""
     values = sorted(trials[column].astype(str).unique())
     if column == "gear":
-        return ", ".join(gear_title(value) for value in values)
+        return ", ".join(model.gear_title(value) for value in values)
     return ", ".join(values)
-
-
-def gear_title(gear: str) -> str:
-    """Name of a landing gear as the paper writes it: Wide-Short for wide_short."""
-    *width, length = (word.capitalize() for word in gear.split("_"))
-    return f"{' '.join(width)}-{length}" if width else length
 
 
 def points(data: Campaign) -> pd.DataFrame:

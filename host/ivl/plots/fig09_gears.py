@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd  # type: ignore[import-untyped]
 
+from ivl import model
 from ivl.analysis.rates import SOLVED_RATE, cell_rates, mean_rate
 from ivl.plots import campaign, style
 from ivl.plots.campaign import RATE_MAP, Campaign
@@ -40,7 +41,7 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
         own = data.trials[data.trials["gear"] == gear]
         image = _draw_disc(axis, cell_rates(own))
         axis.set_title(
-            f"{campaign.gear_title(gear)}\nmean {campaign.interval(mean_rate(own), 2)}", fontsize=style.NORMAL, pad=8
+            f"{model.gear_title(gear)}\nmean {campaign.interval(mean_rate(own), 2)}", fontsize=style.NORMAL, pad=8
         )
     bar = figure.colorbar(image, ax=grid[:, :], location="bottom", shrink=0.5, aspect=35, pad=0.03)
     bar.set_label("four-leg landing rate, mean of the trials; dot: solved by some trial only", fontsize=style.NORMAL)

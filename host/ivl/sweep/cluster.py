@@ -39,6 +39,7 @@ def open_client(scheduler: str | None, workers: int | None = None) -> Iterator[A
         ConfigError: The address is of no known form, or dask-jobqueue is missing or not configured.
         RolloutError: No scheduler answers there.
     """
+    check(scheduler, workers)
     with dask.config.set(_SETTINGS):
         if scheduler is None:
             with _local(workers or processors()) as cluster, _dask.Client(cluster) as client:
@@ -47,10 +48,23 @@ def open_client(scheduler: str | None, workers: int | None = None) -> Iterator[A
             with _slurm(workers) as cluster, _dask.Client(cluster) as client:
                 yield client
         else:
-            if workers is not None:
-                raise ConfigError("--workers: a running scheduler has its own workers; leave it out")
             with _connect(scheduler) as client:
                 yield client
+
+
+def check(scheduler: str | None, workers: int | None) -> None:
+    """Refuse what no cluster can be opened with, before anything is written.
+
+    Raises:
+        ConfigError: See `open_client`.
+    """
+    if scheduler == "slurm" and workers is None:
+        raise ConfigError("--scheduler slurm: say how many workers to ask for with --workers")
+    if scheduler not in (None, "slurm"):
+        if "://" not in scheduler:
+            raise ConfigError(f"--scheduler {scheduler}: expected an address such as tcp://host:8786, or slurm")
+        if workers is not None:
+            raise ConfigError("--workers: a running scheduler has its own workers; leave it out")
 
 
 def processors() -> int:
@@ -67,8 +81,6 @@ def _slurm(workers: int | None) -> Any:
         jobqueue: Any = importlib.import_module("dask_jobqueue")
     except ImportError as error:
         raise ConfigError("--scheduler slurm: dask-jobqueue is not installed (extra `cluster`)") from error
-    if workers is None:
-        raise ConfigError("--scheduler slurm: say how many workers to ask for with --workers")
     try:
         cluster = jobqueue.SLURMCluster(scheduler_options={"dashboard_address": ":0"})
     except ValueError as error:
@@ -78,8 +90,6 @@ def _slurm(workers: int | None) -> Any:
 
 
 def _connect(address: str) -> Any:
-    if "://" not in address:
-        raise ConfigError(f"--scheduler {address}: expected an address such as tcp://host:8786, or slurm")
     try:
         return _dask.Client(address, timeout=_CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:

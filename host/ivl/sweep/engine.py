@@ -106,6 +106,7 @@ def run(
         ConfigError: A landing gear, the vehicle or the cluster's description is wrong.
         RolloutError: The scheduler is lost; the run can be resumed.
     """
+    cluster.check(scheduler, workers)
     worlds = {gear: grid.make_world(gear) for gear in grid.gear_names()}
     size = task_size or plan.good_size(grid, workers or cluster.processors())
     with closing(folder.open_run(run_folder, grid, worlds, size, resume)) as opened:
