@@ -87,7 +87,7 @@ def test_one_gear_that_prefers_slow_approaches_spoils_a_claim_about_all(trials: 
     frame["landing_rate_four_leg_norm"] = rate.where(frame["gear"] != "narrow_long", 1 - frame["speed_mps"] / 4)
     found = claim(frame, 6)
     assert found.verdict == PARTLY
-    assert "narrow_long" in found.finding
+    assert "Narrow-Long" in found.finding
 
 
 def test_short_legs_that_land_as_often_spoil_the_advantage_of_long_ones(trials: Trials) -> None:
