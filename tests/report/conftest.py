@@ -20,6 +20,8 @@ FLAGS = (
     "--disable-sync --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader"
 )
 
+DEADLINE_MS = 240_000  # for a machine that is busy; nothing is judged by it
+
 SMALL = {
     "name": "small",
     "doc": "A short run for tests.",
@@ -91,7 +93,9 @@ def sweep_page(sweep_run: Path) -> Path:
 def browser() -> Iterator[Browser]:
     assert CHROMIUM.exists(), f"{CHROMIUM} is missing: run the tests by `make test-report`, which installs it"
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), headless=True, args=FLAGS.split())
+        browser = playwright.chromium.launch(
+            executable_path=str(CHROMIUM), headless=True, args=FLAGS.split(), timeout=DEADLINE_MS
+        )
         yield browser
         browser.close()
 
@@ -101,6 +105,7 @@ class Visit:
 
     def __init__(self, browser: Browser, path: Path) -> None:
         self.page: Page = browser.new_page(viewport={"width": 1366, "height": 768})
+        self.page.set_default_timeout(DEADLINE_MS)
         self.complaints: list[str] = []
         self.foreign: list[str] = []
         own = path.resolve().as_uri()
@@ -116,7 +121,7 @@ class Visit:
         self.page.on("console", lambda m: self.complaints.append(m.text) if m.type == "error" else None)
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.goto(own)
-        self.page.wait_for_selector("body[data-ready=true]", timeout=60_000)
+        self.page.wait_for_selector("body[data-ready=true]", timeout=DEADLINE_MS)
 
     def drawn(self, pane: int) -> dict[str, Any]:
         """Where body and feet of a view are on its canvas."""

@@ -20,7 +20,7 @@ from ivl.sweep import cluster, engine, store
 from ivl.sweep.config import Sweep
 
 HERE = Path(__file__).parent
-DEADLINE_S = 60.0
+DEADLINE_S = 300.0  # for a machine that is busy; nothing is judged by it
 
 
 def test_two_local_workers_give_the_tables_of_one_process_in_less_than_a_gibibyte(
