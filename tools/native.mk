@@ -165,4 +165,4 @@ $(BUILD)/flags.txt: FORCE
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))
