@@ -23,6 +23,7 @@ _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within se
 _SEED_MAX = 2**64 - 1
 _THREADS_MAX = 256
 
+FloatArray = npt.NDArray[np.float64]
 FloatLike = npt.ArrayLike
 
 
@@ -216,6 +217,18 @@ class World:
             raise ArgumentError(
                 f"{name}: value {value!r} is out of range (allowed {field.lo:g} .. {field.hi:g} {field.unit})"
             )
+
+
+def rotation(q: FloatArray) -> FloatArray:
+    """Rotation matrix body to world, shape (3, 3, ...), of unit quaternions x, y, z, w, shape (4, ...)."""
+    x, y, z, w = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _parts(vehicle: str, gear: str, gear_set: str, sensing: str | None) -> list[model.Part]:

@@ -8,6 +8,7 @@ from ivl import campaign
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.plots import convergence, strobe, style
+from ivl.world import rotation
 
 
 @pytest.fixture
@@ -60,7 +61,7 @@ def test_the_drawn_legs_have_the_length_of_the_legs(world: ivl.World) -> None:
     row = trace.rows[len(trace.rows) // 2]
     values = world.params.values
     hips_B = np.column_stack([values["leg.hip_xy"] * strobe._LEG_SIGNS, np.full(4, values["leg.hip_z"])])
-    hips_W = row.p_WB_m + hips_B @ strobe.rotation(row.q_WB).T
+    hips_W = row.p_WB_m + hips_B @ rotation(row.q_WB).T
     lengths_m = np.linalg.norm(row.foot_W_m.reshape(4, 3) - hips_W, axis=1)
     assert lengths_m == pytest.approx(np.full(4, values["leg.length"]), abs=1e-4)
 

@@ -10,8 +10,7 @@ import numpy.typing as npt
 from ivl import outcome, tracefile
 from ivl.errors import ConfigError
 from ivl.landing import LandingSpec
-from ivl.plots.strobe import rotation
-from ivl.world import World
+from ivl.world import World, rotation
 
 FloatArray = npt.NDArray[np.float64]
 

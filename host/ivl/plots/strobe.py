@@ -20,7 +20,7 @@ from ivl.outcome import four_leg
 from ivl.plots import style
 from ivl.seeds import Purpose, derive
 from ivl.store import SCORED
-from ivl.world import Trace, World
+from ivl.world import Trace, World, rotation
 
 N_GHOSTS = 8
 _BEFORE_TRIGGER_S, _SWING_S = 0.03, 0.14
@@ -139,18 +139,6 @@ def _side(world: World, points_W_m: FloatArray) -> FloatArray:
     """Horizontal place, and height above the ceiling's surface, shape (n, 2)."""
     height_m = world.params.values["world.ceiling_height"]
     return np.column_stack([points_W_m[..., 0], points_W_m[..., 2] - height_m])
-
-
-def rotation(q: FloatArray) -> FloatArray:
-    """Rotation matrix body to world of the unit quaternion x, y, z, w."""
-    x, y, z, w = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def _title(world: World, trace: Trace) -> str:

@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from ivl import native, outcome
 from ivl.landing import LandingSpec
-from ivl.plots.strobe import rotation
 from ivl.reward import RewardOptions, paper
-from ivl.world import Trace, World
+from ivl.world import Trace, World, rotation
 
 SCALE = {"t": 1e-4, "p": 1e-4, "q": 1e-4, "f": 1e-4, "pitch": 0.1, "cues": (1e-4, 1e-3, 1e-2, 1e-2)}
 """Unit of a stored number: s, m, 1, m, degrees; cues: s, m, 1/s, rad/s. The page gets this table with the data."""
