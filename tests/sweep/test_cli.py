@@ -14,7 +14,7 @@ def test_a_dry_run_says_what_would_be_flown_and_flies_nothing(
     monkeypatch.chdir(tmp_path)
     assert cli.run(["sweep", "sweeps/paper.yaml", "--learner", "ephe", "--workers", "2", "--dry-run", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
-    assert (report["trials"], report["rollouts_at_most"]) == (7200, 1_152_000)
+    assert (report["trials"], report["rollouts_at_most"]) == (7200, 1_324_800)
     assert (report["learner"], report["approaches"], len(report["gears"])) == ("ephe", 240, 6)
     assert list(tmp_path.iterdir()) == []
 
