@@ -65,8 +65,8 @@ def test_what_is_drawn_is_what_was_simulated(learn: Visit) -> None:
 
 
 def test_play_runs_to_a_pause(learn: Visit) -> None:
-    learn.set_time(-300)
-    learn.page.select_option("#speed", "1")
+    learn.set_time(-170)
+    learn.page.select_option("#speed", "0.2")  # seconds to the end, however late the second click comes
     learn.page.click("#play")
     learn.page.wait_for_function("Number(document.querySelector('#time').value) > -150")
     learn.page.click("#play")

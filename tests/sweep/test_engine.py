@@ -20,6 +20,9 @@ from ivl.sweep import cluster, engine, store
 from ivl.sweep.config import Sweep
 
 HERE = Path(__file__).parent
+FAULTS = {"IVL_TEST_BROKEN_CELL": "1", "IVL_TEST_TASK_S": "0.5"}
+SLOW = {"DASK_DISTRIBUTED__WORKER__PRELOAD": str(HERE / "fault.py"), "IVL_TEST_TASK_S": "1.5"}
+"""So long that a machine that stalls does not finish what is to be cut off in the middle."""
 DEADLINE_S = 300.0  # for a machine that is busy; nothing is judged by it
 
 
@@ -134,7 +137,7 @@ def tcp_cluster(folder: Path, n_workers: int) -> Iterator[tuple[str, list[subpro
     try:
         wait_for(file.exists, started[0])
         options = ["--nthreads", "1", "--no-nanny", "--preload", str(HERE / "fault.py")]
-        workers = [start(dask, "worker", *options, *common, IVL_TEST_BROKEN_CELL="1") for _ in range(n_workers)]
+        workers = [start(dask, "worker", *options, *common, **FAULTS) for _ in range(n_workers)]
         started += workers
         wait_for(lambda: bool(address_in(file)))
         yield address_in(file), workers
@@ -153,8 +156,7 @@ def address_in(file: Path) -> str:
 
 def ivl(*arguments: str, slow: bool = False) -> "subprocess.Popen[str]":
     """The command line in a process of its own; `slow` makes its workers take their time."""
-    environment = {"DASK_DISTRIBUTED__WORKER__PRELOAD": str(HERE / "fault.py")} if slow else {}
-    return start(sys.executable, "-c", "from ivl.cli import main; main()", *arguments, **environment)
+    return start(sys.executable, "-c", "from ivl.cli import main; main()", *arguments, **(SLOW if slow else {}))
 
 
 def start(*command: str, **environment: str) -> "subprocess.Popen[str]":
