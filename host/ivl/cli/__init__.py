@@ -16,6 +16,7 @@ from ivl.cli import (
     export,
     figs,
     flash,
+    flight,
     fly,
     learn,
     listing,
@@ -52,6 +53,7 @@ app.command("can-gateway", help=can_gateway.HELP, short_help="Carry the link of 
     can_gateway.can_gateway
 )
 app.command("flash", help=flash.HELP)(flash.flash)
+app.add_typer(flight.app, name="flight", short_help="Import, replay, compare and identify recorded flights.")
 
 
 def run(arguments: list[str] | None = None) -> int:

@@ -1,8 +1,8 @@
 """The neutral schema of recorded flights: every column once, with unit, frame and meaning.
 
-Frames: W world, z up, x along the approach; B body, x forward, y left, z up. SI units, radians, seconds. Quaternions turn
-body vectors into world vectors. NaN stands for "not in the log"; a column of which a log has nothing is left out of the
-file and named in the manifest.
+Frames: W world, z up, x along the approach; B body, x forward, y left, z up. SI units, radians, seconds. Quaternions
+turn body vectors into world vectors. NaN stands for "not in the log"; a column of which a log has nothing is left out
+of the file and named in the manifest.
 """
 
 from collections.abc import Mapping

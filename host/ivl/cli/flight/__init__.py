@@ -1,0 +1,19 @@
+"""`ivl flight`: recorded flights, one module a subcommand."""
+
+import typer
+
+HELP = """Work with recorded flights: import a log, replay it, compare it with the simulation, identify the vehicle.
+
+\b
+Examples:
+  ivl flight import learning.csv --format habas2021 --out flights/july
+      a log of another program becomes a folder of flights
+  ivl flight replay flights/july
+      the flight core sees what was recorded: the same cues, the same trigger?
+  ivl flight compare flights/july --vehicle crazyflie21 --gear wide_short
+      recorded against simulated motion and outcome, drawn
+  ivl flight identify flights/july --vehicle crazyflie21 --fit rotor.tau_down,sense.latency --out my.yaml
+      the vehicle that flew, as a vehicle file
+"""
+
+app = typer.Typer(help=HELP, rich_markup_mode=None, no_args_is_help=True)
