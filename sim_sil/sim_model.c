@@ -62,6 +62,9 @@ static void derive_legs(ivl_sim_model_t *model)
                                    : 0.0;
 }
 
+/// Simpson's rule over a step of 2 ms of a decay that is not slower than this is good to 1e-6.
+static const double SLOW_TAU_S = 0.01;
+
 static void derive_plate(ivl_sim_plate_t *plate, double size_x, double size_y, double size_z, double center_z)
 {
     plate->half_m[0] = 0.5 * size_x;
@@ -164,6 +167,12 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
         const char *name = ivl_cfg_bad_name(&model->firmware);
         snprintf(error, error_size, "firmware.%s: refused by the flight core: out of range, or at odds with the vehicle",
                  name ? name : "?");
+        return false;
+    }
+    if (raw->rotor_drag_share_norm > 0.0 && raw->rotor_tau_down_s < SLOW_TAU_S)
+    {
+        snprintf(error, error_size, "rotor.drag_share: %g: goes with rotor.tau_down from %g s on, which is %g s",
+                 raw->rotor_drag_share_norm, SLOW_TAU_S, raw->rotor_tau_down_s);
         return false;
     }
     model->tick_s = 1.0 / (double)model->firmware.tick_hz;

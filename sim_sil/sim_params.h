@@ -29,7 +29,15 @@
     X(rotor, torque_constant, m, "m", 0.0, 0.1, IVL_SIM_REQUIRED, "reaction torque / thrust") \
     X(rotor, tau_up, s, "s", 1.0e-6, 1.0, IVL_SIM_REQUIRED, "time constant of the rotor speed, speeding up") \
     X(rotor, tau_down, s, "s", 1.0e-6, 1.0, IVL_SIM_REQUIRED, "time constant of the rotor speed, slowing down") \
+    X(rotor, drag_share, norm, "1", 0.0, 0.95, 0.0, "share of the slowing down that grows with the square of the speed; 0: a pure exponential") \
+    X(rotor, thrust_gain, norm, "1", 0.5, 1.5, 1.0, "delivered thrust / commanded thrust at the rated voltage, below saturation") \
     X(rotor, thrust_scatter, norm, "1", 0.0, 0.5, 0.0, "standard deviation of each motor's relative thrust error, drawn once a rollout") \
+    X(battery, voltage, V, "V", 0.0, 30.0, 0.0, "open-circuit voltage during a rollout; 0: a supply that never sags") \
+    X(battery, voltage_scatter, V, "V", 0.0, 5.0, 0.0, "its standard deviation, drawn once a rollout") \
+    X(battery, sag, VpN, "V/N", 0.0, 20.0, 0.0, "fall of the voltage under load, for each newton that all rotors make together") \
+    X(battery, rated_voltage, V, "V", 0.5, 30.0, 3.7, "voltage under load at which rotor.thrust_max holds") \
+    X(battery, speed_slope, norm, "1", 0.0, 2.0, 0.8, "relative change of a rotor's speed / relative change of its voltage, duty cycle held") \
+    X(battery, compensated, norm, "1", 0.0, 1.0, 0.0, "1: the autopilot raises the duty cycle as the voltage falls, until it saturates; 0: it does not") \
     X(prop_plate, size_x, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "box that stands for the rotors' disc: length") \
     X(prop_plate, size_y, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "width") \
     X(prop_plate, size_z, m, "m", 0.0, 1.0, IVL_SIM_REQUIRED, "thickness") \

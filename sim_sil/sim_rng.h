@@ -30,6 +30,7 @@ typedef enum
     IVL_SIM_DRAW_RREV_DROP,
     IVL_SIM_DRAW_RANGE_DROP,
     IVL_SIM_DRAW_FLOW_DROP,
+    IVL_SIM_DRAW_BATTERY,  ///< open-circuit voltage of a rollout
 } ivl_sim_draw_t;
 
 typedef struct

@@ -3,12 +3,14 @@
 static const char *const END_NAMES[] = {"contact_time", "missed", "missed_time", "time_max", "refused", "not_finite"};
 _Static_assert(sizeof END_NAMES / sizeof END_NAMES[0] == IVL_SIM_END_COUNT, "a name for each end");
 
+static const double QUATERNION_SLACK = 1.0e-3;  // of the squared length of a stated attitude
+
 const char *ivl_sim_end_name(int end)
 {
     return (end >= 0 && end < IVL_SIM_END_COUNT) ? END_NAMES[end] : "?";
 }
 
-/// Distance from the plane of the cues at which a rollout starts.                               [MODEL eq. 6.1, 6.2]
+/// Distance from the plane of the cues at which a level rollout starts.                          [MODEL eq. 6.1, 6.2]
 static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, double sin_angle)
 {
     const double speed = spec->speed_mps[0];
@@ -19,10 +21,49 @@ static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t 
     case IVL_SIM_START_AT_TRIGGER:
         return spec->d_ceil_m[0];
     case IVL_SIM_START_IMPARTED:
+    case IVL_SIM_START_STATE:
     case IVL_SIM_START_COUNT:
     default:
         return speed * sin_angle * 1.0;
     }
+}
+
+/// Level and without rotation: hovering for `flown`, else at the approach velocity.
+static void level_start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_start_state_t *start)
+{
+    double sin_angle, cos_angle;
+    ivl_sim_sincos(spec->angle_deg[0] * (IVL_SIM_PI / 180.0), &sin_angle, &cos_angle);
+    const double plane = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m;
+    const double speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : spec->speed_mps[0];
+    start->p_W_m[2] = plane - start_distance(model, spec, sin_angle);
+    start->v_W_mps[0] = speed * cos_angle;
+    start->v_W_mps[2] = speed * sin_angle;
+    start->q_WB[3] = 1.0;
+}
+
+/// The state that the specification gives.
+/// @return false if its quaternion is none, or the body is not below the ceiling
+static bool stated_start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_start_state_t *start)
+{
+    double square = 0.0;
+    for (int i = 0; i < 4; i++)
+    {
+        square += spec->q_start_WB[i] * spec->q_start_WB[i];
+    }
+    if (!(fabs(square - 1.0) < QUATERNION_SLACK) || !(spec->p_start_W_m[2] < model->raw.world_ceiling_height_m))
+    {
+        return false;
+    }
+    memcpy(start->p_W_m, spec->p_start_W_m, sizeof start->p_W_m);
+    memcpy(start->v_W_mps, spec->v_start_W_mps, sizeof start->v_W_mps);
+    memcpy(start->w_B_radps, spec->w_start_B_radps, sizeof start->w_B_radps);
+    for (int i = 0; i < 4; i++)
+    {
+        start->q_WB[i] = spec->q_start_WB[i] / sqrt(square);
+        start->rotor_radps[i] = (spec->rotor_start_radps[i] < 0.0) ? start->rotor_radps[i] : spec->rotor_start_radps[i];
+    }
+    start->battery_V = spec->battery_start_V[0];
+    return true;
 }
 
 static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], ivl_command_t *cmd)
@@ -37,15 +78,23 @@ bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_
 {
     const ivl_sim_model_t *model = group->model;
     ivl_sim_world_t       *world = &group->world[lane];
-    double                 sin_angle, cos_angle;
-    ivl_sim_sincos(spec->angle_deg[0] * (IVL_SIM_PI / 180.0), &sin_angle, &cos_angle);
-    const double        plane = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m;
-    const double        speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : spec->speed_mps[0];
-    const double        p[3] = {0.0, 0.0, plane - start_distance(model, spec, sin_angle)};
-    const double        v[3] = {speed * cos_angle, 0.0, speed * sin_angle};
-    const ivl_sim_rng_t rng = {spec->seed[0], spec->stream[0]};
-    ivl_sim_world_start(group, lane, &rng, p, v);
-    request_approach(spec, p, &world->in.cmd);
+    const ivl_sim_rng_t    rng = {spec->seed[0], spec->stream[0]};
+    ivl_sim_start_state_t  start;
+    memset(&start, 0, sizeof start);
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        start.rotor_radps[i] = model->rotor_speed_hover_radps;
+    }
+    if (spec->start[0] != IVL_SIM_START_STATE)
+    {
+        level_start(model, spec, &start);
+    }
+    else if (!stated_start(model, spec, &start))
+    {
+        return false;
+    }
+    ivl_sim_world_start_from(group, lane, &rng, &start);
+    request_approach(spec, start.p_W_m, &world->in.cmd);
     const bool         at_once = spec->start[0] == IVL_SIM_START_AT_TRIGGER;
     const ivl_policy_t policy = {
         .seq = 1, .rrev_c_per_s = at_once ? 0.0f : (float)spec->rrev_c_per_s[0], .moment_y_Nm = (float)(spec->moment_y_Nmm[0] * 1.0e-3)};
@@ -179,6 +228,7 @@ static void write_row(const ivl_sim_world_t *w, const ivl_sim_kin_t *kin, ivl_si
         row->thrust_N[i] = w->rotor.scatter[i] * model->raw.rotor_thrust_constant_Ns2 * speed * speed;
         row->thrust_cmd_N[i] = (double)w->out.thrust_N[i];
     }
+    row->battery_V[0] = (w->rotor.open_circuit_V > 0.0) ? ivl_sim_rotor_voltage(model, &w->rotor) : 0.0;
     for (int leg = 0; leg < IVL_SIM_LEGS; leg++)
     {
         for (int axis = 0; axis < 3; axis++)
@@ -244,10 +294,15 @@ bool ivl_sim_rollout_ended(const ivl_sim_group_t *group, int lane, ivl_sim_outco
 /// Positive form: what is no number is refused too.
 bool ivl_sim_spec_good(const ivl_sim_spec_t *spec)
 {
+    bool good = true;
 #define WITHIN(c_type, name, count, np, unit, lo, hi, dflt, doc)                                                                           \
-    &&(double)spec->name[0] >= (double)(lo) && (double)spec->name[0] <= (double)(hi)
-    return true IVL_SIM_SPEC_FIELDS(WITHIN);
+    for (int i = 0; i < (count); i++)                                                                                                      \
+    {                                                                                                                                      \
+        good = good && (double)spec->name[i] >= (double)(lo) && (double)spec->name[i] <= (double)(hi);                                     \
+    }
+    IVL_SIM_SPEC_FIELDS(WITHIN)
 #undef WITHIN
+    return good;
 }
 
 /// Puts the next landing of the source into a lane; the lane stays empty if there is none.
@@ -269,7 +324,8 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
         }
         else
         {
-            note_end(&group->world[lane], IVL_SIM_END_REFUSED, job->outcome);
+            job->outcome->end_reason[0] = IVL_SIM_END_REFUSED;
+            job->outcome->t_end_s[0] = 0.0;
             group->active[lane] = false;
         }
     }

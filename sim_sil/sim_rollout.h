@@ -10,6 +10,7 @@ typedef enum
     IVL_SIM_START_IMPARTED,    ///< level, at the approach velocity, V_z * 1 s below the ceiling (RREV = 1)
     IVL_SIM_START_FLOWN,       ///< hovering, far enough to reach the speed and hold it for start.hold_time
     IVL_SIM_START_AT_TRIGGER,  ///< level, at the approach velocity, at a stated distance; the flip starts at once
+    IVL_SIM_START_STATE,       ///< any state of free flight, for example a recorded one; the approach goes on from there
     IVL_SIM_START_COUNT
 } ivl_sim_start_t;
 
@@ -34,8 +35,14 @@ typedef enum
     X(double, d_ceil_m, 1, "f8", "m", 0.02, 10.0, 0.5, "start at_trigger: distance of the body origin from the plane of the cues") \
     X(uint64_t, seed, 1, "u8", "1", 0, 18446744073709551615.0, 0, "of the batch") \
     X(uint64_t, stream, 1, "u8", "1", 0, 18446744073709551615.0, 0, "number of the rollout within the seed") \
-    X(int32_t, start, 1, "i4", "1", 0, IVL_SIM_START_COUNT - 1, 0, "0 imparted, 1 flown, 2 at_trigger") \
-    X(int32_t, reserved, 1, "i4", "1", 0, 0, 0, "0")
+    X(int32_t, start, 1, "i4", "1", 0, IVL_SIM_START_COUNT - 1, 0, "0 imparted, 1 flown, 2 at_trigger, 3 state") \
+    X(int32_t, reserved, 1, "i4", "1", 0, 0, 0, "0") \
+    X(double, p_start_W_m, 3, "f8", "m", -100, 100, 0, "start state: body origin in the world, below the ceiling") \
+    X(double, v_start_W_mps, 3, "f8", "m/s", -20, 20, 0, "start state: velocity in the world") \
+    X(double, q_start_WB, 4, "f8", "1", -1, 1, 0, "start state: attitude, x y z w, of unit length") \
+    X(double, w_start_B_radps, 3, "f8", "rad/s", -100, 100, 0, "start state: angular rate in body axes") \
+    X(double, rotor_start_radps, 4, "f8", "rad/s", -1, 100000, -1, "start state: rotor speeds; below 0: at hover") \
+    X(double, battery_start_V, 1, "f8", "V", 0, 30, 0, "start state: open-circuit voltage; 0: the vehicle's own, with its scatter")
 
 #define IVL_SIM_OUTCOME_FIELDS(X) \
     X(int32_t, n_legs, 1, "i4", "1", 0, 4, 0, "feet stuck at the end") \
@@ -73,6 +80,7 @@ typedef enum
     X(double, pitch_deg, 1, "f8", "deg", -3600, 3600, IVL_SIM_REQUIRED, "nose-up rotation, unwrapped") \
     X(double, thrust_N, 4, "f8", "N", 0, 100, IVL_SIM_REQUIRED, "thrust of each motor") \
     X(double, thrust_cmd_N, 4, "f8", "N", 0, 100, IVL_SIM_REQUIRED, "thrust commanded by the flight core") \
+    X(double, battery_V, 1, "f8", "V", 0, 30, IVL_SIM_REQUIRED, "battery voltage under load; 0 for a supply that never sags") \
     X(double, foot_W_m, 12, "f8", "m", -100, 100, IVL_SIM_REQUIRED, "feet 1..4, x y z each") \
     X(int8_t, foot_state, 4, "i1", "1", 0, 2, 0, "0 free, 1 sliding, 2 stuck") \
     X(int32_t, phase, 1, "i4", "1", 0, IVL_PHASE_COUNT - 1, 0, "of the flight core") \

@@ -9,26 +9,79 @@ void ivl_sim_rotor_init(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor)
         rotor->command_radps[i] = model->rotor_speed_hover_radps;
         rotor->scatter[i] = 1.0;
     }
+    rotor->open_circuit_V = model->raw.battery_voltage_V;
+}
+
+double ivl_sim_rotor_voltage(const ivl_sim_model_t *model, const ivl_sim_rotor_t *rotor)
+{
+    double square = 0.0;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        square += rotor->speed_radps[i] * rotor->speed_radps[i];
+    }
+    const double voltage = rotor->open_circuit_V - model->raw.battery_sag_VpN * model->raw.rotor_thrust_constant_Ns2 * square;
+    return (voltage > 0.0) ? voltage : 0.0;
+}
+
+/// Speed of a rotor at its present voltage / its speed at the rated voltage, at equal duty cycle.    [MODEL eq. 2.7]
+static double speed_scale(const ivl_sim_model_t *model, const ivl_sim_rotor_t *rotor)
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    const double            excess = ivl_sim_rotor_voltage(model, rotor) / raw->battery_rated_voltage_V - 1.0;
+    const double            scale = 1.0 + raw->battery_speed_slope_norm * excess;
+    return (scale > 0.0) ? scale : 0.0;
 }
 
 void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const float thrust_N[4])
 {
+    const ivl_sim_params_t *raw = &model->raw;
+    const bool              sags = rotor->open_circuit_V > 0.0;
+    const double            scale = sags ? speed_scale(model, rotor) : 1.0;
+    const double            full = scale * model->rotor_speed_max_radps;
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
-        const double asked = (double)thrust_N[i], most = model->raw.rotor_thrust_max_N;
+        const double asked = raw->rotor_thrust_gain_norm * (double)thrust_N[i], most = raw->rotor_thrust_max_N;
         const double thrust = (asked > 0.0) ? ((asked < most) ? asked : most) : 0.0;
-        rotor->command_radps[i] = sqrt(thrust / model->raw.rotor_thrust_constant_Ns2);
+        const double speed = sqrt(thrust / raw->rotor_thrust_constant_Ns2);
+        if (!sags)
+        {
+            rotor->command_radps[i] = speed;
+            continue;
+        }
+        // the autopilot's map from thrust to duty cycle holds at the rated voltage; with compensation at any, up to full duty
+        const double open_loop = scale * speed;
+        const double delivered = open_loop + raw->battery_compensated_norm * (speed - open_loop);
+        rotor->command_radps[i] = (delivered < full) ? delivered : full;
     }
 }
 
+/// Slowing down towards `command` with a share of drag that grows with the square of the speed: a Bernoulli equation for the
+/// excess g over the command.  Its mean square over the step by Simpson's rule: the decay is slow against a step.
+///                                                                                                    [MODEL eq. 2.9]
+static double slow_down(const ivl_sim_model_t *model, double dt_s, double *speed, double command)
+{
+    const double share = model->raw.rotor_drag_share_norm, tau = model->raw.rotor_tau_down_s, full = model->rotor_speed_max_radps;
+    const double alpha = (1.0 - share + 2.0 * share * command / full) / tau, beta = share / (tau * full);
+    const double g0 = *speed - command, half = ivl_sim_exp(-0.5 * alpha * dt_s), whole = half * half;
+    const double g1 = g0 * half / (1.0 + beta / alpha * g0 * (1.0 - half));
+    const double g2 = g0 * whole / (1.0 + beta / alpha * g0 * (1.0 - whole));
+    *speed = command + g2;
+    const double mean = (g0 + 4.0 * g1 + g2) / 6.0, mean_square = (g0 * g0 + 4.0 * g1 * g1 + g2 * g2) / 6.0;
+    return command * command + 2.0 * command * mean + mean_square;
+}
+
 /// Advances one rotor; returns the mean of (speed^2) over the step.
-static double spin(const ivl_sim_rotor_t *rotor, double *speed, double command)
+static double spin(const ivl_sim_model_t *model, const ivl_sim_rotor_t *rotor, double *speed, double command)
 {
     const double gap = *speed - command;
     if (fabs(gap) < 1.0e-9)
     {
         *speed = command;
         return command * command;
+    }
+    if (gap > 0.0 && model->raw.rotor_drag_share_norm > 0.0)
+    {
+        return slow_down(model, rotor->dt_s, speed, command);
     }
     const double decay = (gap < 0.0) ? rotor->decay_up : rotor->decay_down;
     const double share = (gap < 0.0) ? rotor->share_up : rotor->share_down;
@@ -82,7 +135,7 @@ ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_
     const double gain = (raw->aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, height_m, q_WB) : 1.0;
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
-        const double square = spin(rotor, &rotor->speed_radps[i], rotor->command_radps[i]);
+        const double square = spin(model, rotor, &rotor->speed_radps[i], rotor->command_radps[i]);
         const double thrust = rotor->scatter[i] * raw->rotor_thrust_constant_Ns2 * square;
         load.thrust_N += gain * thrust;
         load.torque_B_Nm[0] += gain * thrust * model->rotor_y_m[i];

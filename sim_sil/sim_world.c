@@ -11,6 +11,7 @@ static const double NEAR_MARGIN_M = 0.05;  // more than a vehicle moves in one s
 static const double FAR_M = 1.0;           // stands for the gap of what cannot make an event
 static const double NO_EVENT = 2.0;        // share of a step, beyond its end
 static const double TIME_SLACK_S = 1.0e-9;
+static const double LEAST_V = 0.01;    // a drawn voltage stays above that of a supply that never sags
 static const double TURNS_MAX = 16.0;  // what the limit on a step's turn can shorten it by
 
 // ---- starting -----------------------------------------------------------------------------------------------------------
@@ -38,6 +39,23 @@ static void draw_scatter(ivl_sim_world_t *w)
             const double factor = 1.0 + sigma * n[i];
             w->rotor.scatter[i] = (factor > 0.0) ? factor : 0.0;
         }
+    }
+}
+
+/// Open-circuit voltage of this rollout: the one given, or drawn about the model's.
+static void draw_battery(ivl_sim_world_t *w, double battery_V)
+{
+    const ivl_sim_params_t *raw = &w->model->raw;
+    if (battery_V > 0.0)
+    {
+        w->rotor.open_circuit_V = battery_V;
+    }
+    else if (raw->battery_voltage_V > 0.0 && raw->battery_voltage_scatter_V > 0.0)
+    {
+        double n[4];
+        ivl_sim_normal4(&w->rng, IVL_SIM_DRAW_BATTERY, 0, n);
+        const double drawn = raw->battery_voltage_V + raw->battery_voltage_scatter_V * n[0];
+        w->rotor.open_circuit_V = (drawn > LEAST_V) ? drawn : LEAST_V;
     }
 }
 
@@ -75,14 +93,50 @@ ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane)
 
 void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3], const double v_W_mps[3])
 {
+    ivl_sim_start_state_t start;
+    memset(&start, 0, sizeof start);
+    memcpy(start.p_W_m, p_W_m, sizeof start.p_W_m);
+    memcpy(start.v_W_mps, v_W_mps, sizeof start.v_W_mps);
+    start.q_WB[3] = 1.0;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        start.rotor_radps[i] = group->model->rotor_speed_hover_radps;
+    }
+    ivl_sim_world_start_from(group, lane, rng, &start);
+}
+
+/// Nose-up pitch of an attitude, within half a turn: the branch on which the integral of the rate begins.
+static double nose_up_of(const double q_WB[4])
+{
+    const ivl_rot_t R = ivl_rot_from_quat(q_WB);
+    return ivl_sim_atan2(R.row[2].x, R.row[0].x);
+}
+
+/// A start that turns: the feet go along as points of the body.
+static void turn_legs(ivl_sim_kin_t *kin)
+{
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    const ivl_d3_t  rate_W = ivl_rot_apply(&R, ivl_d3_load(kin->w_B_radps));
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_d3_t arm = ivl_d3_sub(ivl_d3_load(kin->p_foot_W_m[i]), ivl_d3_load(kin->p_WB_m));
+        ivl_d3_store(kin->v_foot_W_mps[i], ivl_d3_add(ivl_d3_load(kin->v_WB_mps), ivl_d3_cross(rate_W, arm)));
+    }
+}
+
+void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const ivl_sim_start_state_t *start)
+{
     const ivl_sim_model_t *model = group->model;
     ivl_sim_world_t       *w = &group->world[lane];
     ivl_sim_kin_t          kin;
     memset(&kin, 0, sizeof kin);
-    memcpy(kin.p_WB_m, p_W_m, sizeof kin.p_WB_m);
-    memcpy(kin.v_WB_mps, v_W_mps, sizeof kin.v_WB_mps);
-    kin.q_WB[3] = 1.0;
+    memcpy(kin.p_WB_m, start->p_W_m, sizeof kin.p_WB_m);
+    memcpy(kin.v_WB_mps, start->v_W_mps, sizeof kin.v_WB_mps);
+    memcpy(kin.q_WB, start->q_WB, sizeof kin.q_WB);
+    memcpy(kin.w_B_radps, start->w_B_radps, sizeof kin.w_B_radps);
+    kin.pitch_rad = nose_up_of(kin.q_WB);
     ivl_sim_world_rest_legs(model, &kin);
+    turn_legs(&kin);
     // all but the sensors, whose queue is large and needs no clearing
     memset(w, 0, offsetof(ivl_sim_world_t, sensors));
     memset(&w->firmware, 0, sizeof *w - offsetof(ivl_sim_world_t, firmware));
@@ -91,7 +145,10 @@ void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *
     w->step_s = model->raw.step_flight_s * model->raw.step_scale_norm;
     ivl_sim_contact_set(model, &group->contact, lane, w->foot);
     ivl_sim_rotor_init(model, &w->rotor);
+    memcpy(w->rotor.speed_radps, start->rotor_radps, sizeof w->rotor.speed_radps);
+    memcpy(w->rotor.command_radps, start->rotor_radps, sizeof w->rotor.command_radps);
     draw_scatter(w);
+    draw_battery(w, start->battery_V);
     ivl_sim_sensors_init(model, rng, &kin, &w->sensors);
     model->core.init(group->port, lane, &model->firmware, &w->firmware);
     ivl_sim_world_place(group, lane, &kin);

@@ -74,11 +74,24 @@ typedef struct
     ivl_sim_world_t        world[IVL_SIM_LANES];
 } ivl_sim_group_t;
 
+/// What a vehicle in free flight starts with; legs at rest on the body.
+typedef struct
+{
+    double p_W_m[3], v_W_mps[3];
+    double q_WB[4];                      ///< x, y, z, w; of unit length
+    double w_B_radps[3];                 ///< angular rate, body axes
+    double rotor_radps[IVL_SIM_MOTORS];  ///< rotor speeds, commanded as well until the first tick
+    double battery_V;                    ///< open-circuit voltage; 0: the model's, with its scatter
+} ivl_sim_start_state_t;
+
 /// All lanes empty.
 void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group);
 
 /// Puts a vehicle into a lane: in free flight, level, rotors at hover, legs at rest; the core in IDLE.
 void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3], const double v_W_mps[3]);
+
+/// Puts a vehicle into a lane, in free flight; the core in IDLE.
+void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const ivl_sim_start_state_t *start);
 
 /// Replaces the state of motion, for tests; the feet hold on as before.
 void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *kin);

@@ -15,7 +15,7 @@ from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError, Nativ
 from ivl.experiment import Experiment
 from ivl.learners import EPHE, Learner, RobustEPHE, make_learner
 from ivl.outcome import clean, four_leg
-from ivl.world import Trace, World
+from ivl.world import State, Trace, World
 
 __all__ = [
     "EPHE",
@@ -28,6 +28,7 @@ __all__ = [
     "NativeError",
     "RobustEPHE",
     "RolloutError",
+    "State",
     "StoreError",
     "Trace",
     "World",

@@ -128,6 +128,14 @@ class NativeLibrary:
         """SHA-256 of the library file: two runs are only comparable bit for bit if it is the same."""
         return hashlib.sha256(self.path.read_bytes()).hexdigest()
 
+    def default_specs(self, n: int) -> npt.NDArray[np.void]:
+        """Rollout specifications with every field at its default, those without one at zero; shape (n,)."""
+        specs = np.zeros(n, dtype=self.spec_dtype)
+        for name, field in self.spec_fields.items():
+            if field.default is not None:
+                specs[name] = field.default
+        return specs
+
     def create_model(self, values: npt.NDArray[np.float64]) -> "NativeModel":
         """Build a native model from the parameter vector (order of `params`)."""
         return NativeModel(self, values)

@@ -18,13 +18,64 @@ import numpy.typing as npt
 from ivl import model, native
 from ivl.errors import ArgumentError, NativeError
 
-START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2}
+START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2, "state": 3}
 _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within seconds
 _SEED_MAX = 2**64 - 1
 _THREADS_MAX = 256
+_QUATERNION_SLACK = 4e-4
 
 FloatArray = npt.NDArray[np.float64]
 FloatLike = npt.ArrayLike
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of free flight from which a rollout starts, for example a recorded one.
+
+    Each member is one state or many; leading axes broadcast with the other arguments of `World.rollouts`.
+
+    Attributes:
+        p_W_m: Position of the body origin in the world, shape (..., 3), m.
+        v_W_mps: Velocity in the world, shape (..., 3), m/s.
+        q_WB: Attitude, unit quaternion x, y, z, w, shape (..., 4).
+        w_B_radps: Angular rate in body axes, shape (..., 3), rad/s.
+        rotor_radps: Rotor speeds M1..M4, shape (..., 4), rad/s; None: those of a hover.
+        battery_V: Open-circuit voltage of the battery, shape (...), V; None: the vehicle's own, with its scatter.
+    """
+
+    p_W_m: npt.ArrayLike
+    v_W_mps: npt.ArrayLike = (0.0, 0.0, 0.0)
+    q_WB: npt.ArrayLike = (0.0, 0.0, 0.0, 1.0)
+    w_B_radps: npt.ArrayLike = (0.0, 0.0, 0.0)
+    rotor_radps: npt.ArrayLike | None = None
+    battery_V: npt.ArrayLike | None = None
+
+    def fields(self) -> dict[str, npt.NDArray[np.float64]]:
+        """The members under the names of the library's table of specifications; vectors keep their last axis.
+
+        Raises:
+            ArgumentError: A member has another number of components, or is not a number.
+        """
+        given = {
+            "p_start_W_m": (self.p_W_m, 3),
+            "v_start_W_mps": (self.v_W_mps, 3),
+            "q_start_WB": (self.q_WB, 4),
+            "w_start_B_radps": (self.w_B_radps, 3),
+        }
+        if self.rotor_radps is not None:
+            given["rotor_start_radps"] = (self.rotor_radps, 4)
+        fields = {}
+        for name, (value, n) in given.items():
+            fields[name] = _numbers(f"state: {name}", value)
+            if fields[name].shape[-1:] != (n,):
+                raise ArgumentError(f"state: {name}: {n} components are needed, its shape is {fields[name].shape}")
+        if self.battery_V is not None:
+            fields["battery_start_V"] = _numbers("state: battery_V", self.battery_V)
+        length = np.linalg.norm(fields["q_start_WB"], axis=-1)
+        if not (np.abs(length - 1.0) < _QUATERNION_SLACK).all():
+            bad = float(length[~(np.abs(length - 1.0) < _QUATERNION_SLACK)].flat[0])
+            raise ArgumentError(f"state: q_WB: length {bad:g} (allowed 1 +- {_QUATERNION_SLACK:g}: a unit quaternion)")
+        return fields
 
 
 @dataclass(frozen=True)
@@ -122,6 +173,7 @@ class World:
         d_ceil_m: FloatLike | None = None,
         threads: int | None = None,
         stream: npt.ArrayLike | None = None,
+        state: State | None = None,
     ) -> np.recarray[Any, Any]:
         """Fly one rollout for each element of the broadcast of the arguments.
 
@@ -131,11 +183,12 @@ class World:
             rrev_c_per_s: Trigger threshold RREV_c, 1/s.
             moment_y_Nmm: Magnitude of the nose-up body moment M_yd, N mm.
             seed: Seed of the random numbers, 0 .. 2^64 - 1.
-            start: "imparted" (at the approach velocity), "flown" (from hover) or "at_trigger" (moment commanded at
-                once).
+            start: "imparted" (at the approach velocity), "flown" (from hover), "at_trigger" (moment commanded at
+                once) or "state" (from the state of free flight in `state`; RREV_c = 0 flips at once).
             d_ceil_m: Distance to the ceiling at the start, m; for "at_trigger" alone, which needs it.
             threads: Worker threads; omitted: all processors.
             stream: Number of the rollout within its seed; omitted: the flat index in this call.
+            state: State to start from; for "state" alone, which needs it.
 
         Returns:
             Record array of outcomes in the shape of the broadcast; fields of the library's outcome table.
@@ -144,7 +197,7 @@ class World:
             ArgumentError: An argument is not finite, out of range, or does not broadcast.
         """
         specs, shape = self._specs(
-            start, stream, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
+            start, stream, state, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
             moment_y_Nmm=moment_y_Nmm, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         n_threads = _check_threads(threads)
@@ -165,10 +218,11 @@ class World:
         d_ceil_m: float | None = None,
         stream: int = 0,
         period_s: float = 0.002,
+        state: State | None = None,
     ) -> Trace:
         """Fly one rollout and record it every `period_s` seconds (arguments and errors as `rollouts`, scalars only)."""
         specs, shape = self._specs(
-            start, stream, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
+            start, stream, state, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
             moment_y_Nmm=moment_y_Nmm, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         if shape != ():
@@ -179,32 +233,34 @@ class World:
         return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
 
     def _specs(
-        self, start: str, stream: npt.ArrayLike | None, **arguments: npt.ArrayLike | None
+        self, start: str, stream: npt.ArrayLike | None, state: State | None, **arguments: npt.ArrayLike | None
     ) -> tuple[npt.NDArray[np.void], tuple[int, ...]]:
         """Checked, broadcast and flattened rollout specifications, and the shape they had."""
         if start not in START_CODES:
             raise ArgumentError(f"start: value {start!r} is unknown (allowed {', '.join(START_CODES)})")
-        if (start == "at_trigger") != (arguments["d_ceil_m"] is not None):
-            raise ArgumentError(
-                f"d_ceil_m: value {arguments['d_ceil_m']!r}: start='at_trigger' needs it, others must not have it"
-            )
+        for name, value, needed in (("d_ceil_m", arguments["d_ceil_m"], "at_trigger"), ("state", state, "state")):
+            if (start == needed) != (value is not None):
+                raise ArgumentError(f"{name}: value {value!r}: start={needed!r} needs it, others must not have it")
         given = {
             name: _numbers(name, value) for name, value in arguments.items() if name != "d_ceil_m" or value is not None
         }
         if stream is not None:
             given["stream"] = _numbers("stream", stream)
+        given |= state.fields() if state is not None else {}
+        vectors = {n for n in given if n in self._library.spec_fields and self._library.spec_fields[n].count > 1}
+        shapes = {name: array.shape[:-1] if name in vectors else array.shape for name, array in given.items()}
         try:
-            shape = np.broadcast_shapes(*(array.shape for array in given.values()))
+            shape = np.broadcast_shapes(*shapes.values())
         except ValueError as error:
-            shapes = ", ".join(f"{name} {array.shape}" for name, array in given.items() if array.shape)
-            raise ArgumentError(f"the arguments do not broadcast: {shapes}") from error
-        specs = np.zeros(int(np.prod(shape, dtype=np.int64)), dtype=self._library.spec_dtype)
+            named = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
+            raise ArgumentError(f"the arguments do not broadcast: {named}") from error
+        specs = self._library.default_specs(int(np.prod(shape, dtype=np.int64)))
         specs["start"] = START_CODES[start]
-        specs["d_ceil_m"] = self._library.spec_fields["d_ceil_m"].default
         specs["stream"] = np.arange(specs.size, dtype=np.uint64)
         for name, array in given.items():
             self._check_range(name, array)
-            specs[name] = np.broadcast_to(array, shape).ravel()
+            whole = (*shape, array.shape[-1]) if name in vectors else shape
+            specs[name] = np.broadcast_to(array, whole).reshape(specs[name].shape)
         return specs, shape
 
     def _check_range(self, name: str, array: npt.NDArray[Any]) -> None:

@@ -31,7 +31,7 @@ static void reset_written(void)
 
 static void start_written(void)
 {
-    if (THE.set.start >= IVL_SIM_START_COUNT && THE.set.start != IVL_CF_START_AS_FLOWN)
+    if (THE.set.start >= IVL_SIM_START_STATE && THE.set.start != IVL_CF_START_AS_FLOWN)
     {
         THE.set.start = IVL_CF_START_AS_FLOWN;
         ivl_cf_param_changed(&THE, &THE.set.start);

@@ -133,7 +133,7 @@ static void test_landings_have_the_bits_of_the_same_landing_in_the_process_of_th
         TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit_config(1).status);
         for (int i = 0; i < N_EACH; i++)
         {
-            const ivl_sim_spec_t    spec = draw_spec(&draws, (ivl_sim_start_t)(i % IVL_SIM_START_COUNT));
+            const ivl_sim_spec_t    spec = draw_spec(&draws, (ivl_sim_start_t)(i % IVL_SIM_START_STATE));
             const ivl_sim_outcome_t expected = fly_linked(&model, &spec), outcome = fly(&spec, 10u + (uint32_t)i);
             TEST_ASSERT_EQUAL_MEMORY(&expected, &outcome, sizeof expected);
             n_landed += (expected.n_legs[0] >= 3) ? 1 : 0;
@@ -188,7 +188,7 @@ static void test_a_landing_that_was_cut_short_by_a_reset_leaves_no_trace_in_the_
     draws_t draws = {5};
     for (int i = 0; i < 60; i++)
     {
-        const ivl_sim_spec_t    spec = draw_spec(&draws, (ivl_sim_start_t)(i % IVL_SIM_START_COUNT));
+        const ivl_sim_spec_t    spec = draw_spec(&draws, (ivl_sim_start_t)(i % IVL_SIM_START_STATE));
         const ivl_sim_outcome_t expected = fly_linked(&model, &spec), outcome = fly(&spec, 1u + (uint32_t)i);
         TEST_ASSERT_EQUAL_MEMORY(&expected, &outcome, sizeof expected);
         // ready again in one write, whatever it does now; then into another landing, and out of it after any time
