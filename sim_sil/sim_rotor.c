@@ -90,15 +90,35 @@ static double spin(const ivl_sim_model_t *model, const ivl_sim_rotor_t *rotor, d
 }
 
 /// Thrust gain near the ceiling, for an upright rotor.                                           [MODEL eq. 2.5]
-static double ceiling_effect(const ivl_sim_model_t *model, double height_m, const double q_WB[4])
+static double ceiling_effect(const ivl_sim_model_t *model, double height_m, const ivl_rot_t *R)
 {
     const ivl_sim_params_t *raw = &model->raw;
-    const ivl_rot_t         R = ivl_rot_from_quat(q_WB);
-    const double            gap = raw->world_ceiling_height_m - height_m - R.row[2].z * raw->rotor_z_m;
+    const double            gap = raw->world_ceiling_height_m - height_m - R->row[2].z * raw->rotor_z_m;
     const double            least = 0.5 * raw->aero_rotor_radius_m;
     const double            ratio = raw->aero_rotor_radius_m / ((gap > least) ? gap : least);
-    const double            upright = (R.row[2].z > 0.0) ? R.row[2].z : 0.0;
+    const double            upright = (R->row[2].z > 0.0) ? R->row[2].z : 0.0;
     return 1.0 + raw->aero_ceiling_gain_norm * upright * ratio * ratio;
+}
+
+/// Thrust that is left when the rotors climb along their axis; a descent does not raise it.         [MODEL eq. 2.10]
+static double inflow(const ivl_sim_model_t *model, const double v_W_mps[3], const ivl_rot_t *R)
+{
+    const double climb = R->row[0].z * v_W_mps[0] + R->row[1].z * v_W_mps[1] + R->row[2].z * v_W_mps[2];
+    const double left = 1.0 - model->raw.rotor_inflow_loss_spm * ((climb > 0.0) ? climb : 0.0);
+    return (left > 0.0) ? left : 0.0;
+}
+
+/// Factor on the thrust of all rotors, by what the air around them does.
+static double air_gain(const ivl_sim_model_t *model, const ivl_sim_airflow_t *body)
+{
+    double gain = 1.0;
+    if (model->raw.aero_ceiling_gain_norm > 0.0 || model->raw.rotor_inflow_loss_spm > 0.0)
+    {
+        const ivl_rot_t R = ivl_rot_from_quat(body->q_WB);
+        gain = (model->raw.aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, body->height_m, &R) : gain;
+        gain *= (model->raw.rotor_inflow_loss_spm > 0.0) ? inflow(model, body->v_W_mps, &R) : 1.0;
+    }
+    return gain;
 }
 
 bool ivl_sim_rotor_still(const ivl_sim_rotor_t *rotor)
@@ -111,8 +131,7 @@ bool ivl_sim_rotor_still(const ivl_sim_rotor_t *rotor)
     return !(most > 0.0);
 }
 
-ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m, const double q_WB[4],
-                                    double dt_s)
+ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const ivl_sim_airflow_t *body, double dt_s)
 {
     const ivl_sim_params_t *raw = &model->raw;
     ivl_sim_thrust_t        load = {0.0, {0.0, 0.0, 0.0}};
@@ -132,7 +151,7 @@ ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_
         rotor->share_up = raw->rotor_tau_up_s / dt_s;
         rotor->share_down = raw->rotor_tau_down_s / dt_s;
     }
-    const double gain = (raw->aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, height_m, q_WB) : 1.0;
+    const double gain = air_gain(model, body);
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
         const double square = spin(model, rotor, &rotor->speed_radps[i], rotor->command_radps[i]);

@@ -12,6 +12,14 @@ typedef struct
     double torque_B_Nm[3];
 } ivl_sim_thrust_t;
 
+/// What the air at the rotors depends on.
+typedef struct
+{
+    double height_m;    ///< of the body origin
+    double v_W_mps[3];  ///< its velocity
+    double q_WB[4];
+} ivl_sim_airflow_t;
+
 typedef struct
 {
     double speed_radps[IVL_SIM_MOTORS];
@@ -38,8 +46,7 @@ double ivl_sim_rotor_voltage(const ivl_sim_model_t *model, const ivl_sim_rotor_t
 bool ivl_sim_rotor_still(const ivl_sim_rotor_t *rotor);
 
 /// Advances the rotors by dt and returns force and moment, each averaged over dt.                [MODEL eq. 2.3, 2.4, 2.9]
-/// @param[in] height_m, q_WB  of the body at the start of the step, for the ceiling effect
-ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m, const double q_WB[4],
-                                    double dt_s);
+/// @param[in] body  motion of the body at the start of the step, for ceiling effect and inflow
+ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, const ivl_sim_airflow_t *body, double dt_s);
 
 #endif  // IVL_SIM_ROTOR_H

@@ -429,10 +429,12 @@ static void propose(ivl_sim_group_t *group, int lane, double dt)
     w->trial.powered = !ivl_sim_rotor_still(&w->rotor);
     if (w->trial.powered)
     {
-        const ivl_wide_t *q = group->state.q_WB;
-        const double      attitude[4] = {q[0][lane], q[1][lane], q[2][lane], q[3][lane]};
+        const ivl_sim_state_t  *s = &group->state;
+        const ivl_sim_airflow_t body = {s->p_WB_m.z[lane],
+                                        {s->v_WB_mps.x[lane], s->v_WB_mps.y[lane], s->v_WB_mps.z[lane]},
+                                        {s->q_WB[0][lane], s->q_WB[1][lane], s->q_WB[2][lane], s->q_WB[3][lane]}};
         w->trial.rotor = w->rotor;
-        thrust = ivl_sim_rotor_step(w->model, &w->trial.rotor, group->state.p_WB_m.z[lane], attitude, dt);
+        thrust = ivl_sim_rotor_step(w->model, &w->trial.rotor, &body, dt);
     }
     group->dt_s[lane] = dt;
     group->load.thrust_N[lane] = thrust.thrust_N;

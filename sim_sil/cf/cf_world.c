@@ -96,10 +96,12 @@ static void come_to_rest(ivl_cf_t *cf)
 
 static void rest(ivl_cf_t *cf)
 {
-    ivl_sim_world_t       *w = ivl_cf_world(cf);
-    const ivl_sim_kin_t    kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
-    const ivl_rot_t        R = ivl_rot_from_quat(kin.q_WB);
-    const ivl_sim_thrust_t load = ivl_sim_rotor_step(&cf->model, &w->rotor, kin.p_WB_m[2], kin.q_WB, cf->model.tick_s);
+    ivl_sim_world_t    *w = ivl_cf_world(cf);
+    const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
+    const ivl_rot_t     R = ivl_rot_from_quat(kin.q_WB);
+    ivl_sim_airflow_t   body = {.height_m = kin.p_WB_m[2]};  // at rest
+    memcpy(body.q_WB, kin.q_WB, sizeof body.q_WB);
+    const ivl_sim_thrust_t load = ivl_sim_rotor_step(&cf->model, &w->rotor, &body, cf->model.tick_s);
     w->left_s = 0.0;
     w->restart = true;
     cf->grounded = !(load.thrust_N * R.row[2].z > cf->model.mass_total_kg * cf->model.raw.world_gravity_mps2);
