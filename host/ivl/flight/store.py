@@ -13,6 +13,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -141,28 +142,36 @@ def _known(value: Any, column: Column) -> Any:
 
 
 def write(folder: Path, flights: Flights) -> None:
-    """Write a folder of flights; the manifest comes last, so that a folder with one is whole.
+    """Write a folder of flights: whole, or not at all.
 
     Raises:
         ConfigError: The folder holds something already, or cannot be written.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise ConfigError(f"{folder}: is not empty: name a new folder")
-        present = [n for n in SAMPLES if n == "flight" or any(f.has(n) for f in flights)]
-        schema = _schema({name: SAMPLES[name] for name in present})
-        with pq.ParquetWriter(folder / SAMPLES_FILE, schema, compression="zstd") as writer:
-            for number, flight in enumerate(flights):
-                data = {n: np.full(len(flight), number, np.int32) if n == "flight" else flight[n] for n in present}
-                writer.write_table(pa.table(data, schema=schema), row_group_size=max(len(flight), 1))
-        rows = [{**flight.info, "flight": number} for number, flight in enumerate(flights)]
-        pq.write_table(pa.Table.from_pylist(rows, schema=_schema(FLIGHTS)), folder / FLIGHTS_FILE, compression="zstd")
-        known = {name: getattr(flights.manifest, name) for name in _MANIFEST_FIELDS}
-        manifest = {"schema_version": SCHEMA_VERSION, "n_flights": len(flights), **known, "units": _units(present)}
-        (folder / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise ConfigError(f"{folder}: is there already: name a new folder")
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent) as name:
+            part = Path(name) / "flights"
+            part.mkdir()
+            _write_files(part, flights)
+            part.rename(folder)
     except OSError as error:
-        raise ConfigError(f"{folder}: cannot be written: {error}") from error
+        raise ConfigError(f"{folder}: cannot be written: {error.strerror or error}") from error
+
+
+def _write_files(folder: Path, flights: Flights) -> None:
+    present = [n for n in SAMPLES if n == "flight" or any(f.has(n) for f in flights)]
+    schema = _schema({name: SAMPLES[name] for name in present})
+    with pq.ParquetWriter(folder / SAMPLES_FILE, schema, compression="zstd") as writer:
+        for number, flight in enumerate(flights):
+            data = {n: np.full(len(flight), number, np.int32) if n == "flight" else flight[n] for n in present}
+            writer.write_table(pa.table(data, schema=schema), row_group_size=len(flight))
+    rows = [{**flight.info, "flight": number} for number, flight in enumerate(flights)]
+    pq.write_table(pa.Table.from_pylist(rows, schema=_schema(FLIGHTS)), folder / FLIGHTS_FILE, compression="zstd")
+    known = {name: getattr(flights.manifest, name) for name in _MANIFEST_FIELDS}
+    manifest = {"schema_version": SCHEMA_VERSION, "n_flights": len(flights), **known, "units": _units(present)}
+    (folder / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
 
 
 def read(folder: Path) -> Flights:

@@ -1,0 +1,75 @@
+"""`ivl flight import`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ivl.cli import console
+from ivl.errors import ConfigError, IvlError
+
+HELP = """Turn logs of other programs into a folder of flights, which every other command of `ivl flight` reads.
+
+SOURCE is a log file. The folder holds flights.parquet (one row a flight), samples.parquet (the time series, units in
+the names) and manifest.json (source, licence, frames, clock, what is absent). What the log does not say can be given
+as an option; what it says cannot be changed. A damaged file is refused with its line and column.
+
+\b
+Examples:
+  ivl flight import learning.csv --format habas2021 --out flights/july --licence MIT
+      the study's CSV: the last attempt of each rollout
+  ivl flight import learning.csv --format habas2021 --out flights/all --attempts all
+      the failed attempts too
+"""
+
+
+def import_(
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Log files.")],
+    format_name: Annotated[str, typer.Option("--format", help="Form of the log; see docs/FLIGHT_DATA.md.")],
+    out: Annotated[Path, typer.Option(help="Folder to make.")],
+    licence: Annotated[str, typer.Option(help="Terms under which the data may be passed on.")] = "",
+    rrev: Annotated[float | None, typer.Option("--rrev", "--rrev-c", help="Policy: RREV_c, 1/s.")] = None,
+    moment: Annotated[float | None, typer.Option(help="Policy: flip moment M_yd, N mm.")] = None,
+    speed: Annotated[float | None, typer.Option(help="Approach speed, m/s.")] = None,
+    angle: Annotated[float | None, typer.Option(help="Approach angle above the horizontal, degrees.")] = None,
+    h_plane: Annotated[float | None, typer.Option(help="Height of the plane that the cues are for, m.")] = None,
+    h_surface: Annotated[float | None, typer.Option(help="Height of the ceiling's surface, m.")] = None,
+    outcome: Annotated[
+        str, typer.Option(metavar="N,N,...", help="Feet that held in each flight; - where unknown.")
+    ] = "",
+    judged_by: Annotated[str, typer.Option(help="Who saw the outcomes.")] = "operator",
+    attempts: Annotated[str, typer.Option(metavar="last|all", help="Which attempts of a rollout.")] = "last",
+    maps: Annotated[
+        list[str] | None, typer.Option("--map", metavar="COLUMN=VARIABLE[*FACTOR]", help="A column by another name.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Import; HELP is the text that people see."""
+    try:
+        from ivl.flight import importer, log
+    except ModuleNotFoundError as error:
+        raise IvlError(f"{error.name} is not installed: pip install 'ivl[flight]'") from error
+    if attempts not in (log.LAST, log.ALL):
+        raise ConfigError(f"--attempts {attempts}: unknown (allowed {log.LAST}, {log.ALL})")
+    given = log.Given(
+        licence, rrev, moment, speed, angle, h_plane, h_surface, _outcomes(outcome), judged_by, attempts,
+        [log.parse_rule(text) for text in maps or []],
+    )  # fmt: skip
+    flights = importer.run(sources, format_name, given)
+    importer.write(out, flights)
+    counts = {"flights": len(flights), "usable": len(flights.usable()), "samples": sum(len(f) for f in flights)}
+    if as_json:
+        console.print_json({"folder": str(out), **counts, "notes": list(flights.manifest.notes)})
+        return
+    console.out.print(
+        f"{out}: {counts['flights']} flights, {counts['usable']} usable, {counts['samples']} samples",
+        highlight=False, markup=False, soft_wrap=True,
+    )  # fmt: skip
+
+
+def _outcomes(text: str) -> list[int | None]:
+    words = [word.strip() for word in text.split(",")] if text else []
+    for word in words:
+        if word != "-" and not (word.isascii() and word.isdigit()):
+            raise ConfigError(f"--outcome {text}: value {word!r} is neither a number of feet nor -")
+    return [None if word == "-" else int(word) for word in words]

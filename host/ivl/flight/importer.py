@@ -1,0 +1,109 @@
+"""From the files of another program to a folder of flights."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ivl.errors import ConfigError
+from ivl.flight import store
+from ivl.flight.formats import by_name
+from ivl.flight.log import Given, Log
+from ivl.flight.schema import SAMPLES
+from ivl.flight.store import Flight, Flights, Manifest
+
+_SAME = 0.01
+"""Two numbers for one thing may differ by this share: a log is rounded."""
+_LEGS_MAX = 4
+
+
+def run(sources: Sequence[Path], format_name: str, given: Given) -> Flights:
+    """Read logs; nothing is written.
+
+    Args:
+        sources: Files, or folders if the format knows what lies in them.
+        format_name: Name of the format.
+        given: What the person says about the flights.
+
+    Raises:
+        ConfigError: A file is damaged or of another format, or what was given contradicts it. One line.
+    """
+    log = by_name(format_name).load(sources, given)
+    if not log.flights:
+        raise ConfigError(f"{', '.join(str(path) for path in sources)}: holds no flight")
+    flights = [_complete(flight, given) for flight in log.flights]
+    flights = [_judged(f, n, given) for f, n in zip(flights, _outcomes(flights, given), strict=True)]
+    flights = _unique_labels(flights)
+    manifest = Manifest(
+        format=format_name,
+        source=_digests(sources),
+        licence=given.licence or "not stated",
+        frames=log.frames,
+        clock=log.clock,
+        absent=_absent(log, flights),
+        notes=list(log.notes),
+    )
+    return Flights(manifest, tuple(flights))
+
+
+def write(folder: Path, flights: Flights) -> None:
+    """Write a folder of flights (errors as `store.write`)."""
+    store.write(folder, flights)
+
+
+def _complete(flight: Flight, given: Given) -> Flight:
+    """Add what the log does not say."""
+    names = ("rrev_c_per_s", "moment_y_Nmm", "speed_mps", "angle_deg", "h_plane_m", "h_surface_m")
+    info: dict[str, Any] = dict(flight.info)
+    for name in names:
+        value = getattr(given, name)
+        if value is None:
+            continue
+        if np.isfinite(info[name]) and abs(info[name] - value) > _SAME * max(abs(value), 1.0):
+            raise ConfigError(f"flight {flight.label}: {name}: {value:g} was given, but the log says {info[name]:g}")
+        info[name] = info[name] if np.isfinite(info[name]) else value
+    return Flight(info, flight.samples)
+
+
+def _outcomes(flights: Sequence[Flight], given: Given) -> Sequence[int | None]:
+    if not given.outcomes:
+        return [None] * len(flights)
+    if len(given.outcomes) != len(flights):
+        raise ConfigError(f"--outcome: {len(given.outcomes)} outcomes for {len(flights)} flights")
+    for n in given.outcomes:
+        if n is not None and not 0 <= n <= _LEGS_MAX:
+            raise ConfigError(f"--outcome: value {n}: feet that hold (allowed 0 .. {_LEGS_MAX}, or - for unknown)")
+    return given.outcomes
+
+
+def _judged(flight: Flight, n_legs: int | None, given: Given) -> Flight:
+    if n_legs is None:
+        return flight
+    return Flight({**flight.info, "n_legs": n_legs, "judged_by": given.judged_by or "operator"}, flight.samples)
+
+
+def _unique_labels(flights: Sequence[Flight]) -> list[Flight]:
+    """Number the labels that are there more than once."""
+    total, seen = Counter(flight.label for flight in flights), Counter[str]()
+    result = []
+    for flight in flights:
+        label = flight.label
+        seen[label] += 1
+        number = f"#{seen[label]}" if total[label] > 1 else ""
+        result.append(Flight({**flight.info, "label": label + number}, flight.samples))
+    return result
+
+
+def _digests(sources: Sequence[Path]) -> list[dict[str, str]]:
+    files = [file for path in sources for file in (sorted(path.rglob("*")) if path.is_dir() else [path])]
+    return [
+        {"file": str(file), "sha256": hashlib.sha256(file.read_bytes()).hexdigest()} for file in files if file.is_file()
+    ]
+
+
+def _absent(log: Log, flights: Sequence[Flight]) -> dict[str, str]:
+    missing = [name for name in SAMPLES if name != "flight" and not any(flight.has(name) for flight in flights)]
+    return {name: log.absent.get(name, "not in the log") for name in missing}
