@@ -1,0 +1,275 @@
+"""The flip as it was recorded, and the same flip flown by the simulator.
+
+Both sides are what the vehicle itself would log: attitude and rate from the gyro, clipped where the gyro clips; height
+and climb as the state estimate gives them, `sense.latency` late. Time runs from the trigger.
+
+    flip = motion.flip(flight)
+    simulated = motion.fly(world, flip)
+    np.sqrt(np.mean((simulated.pitch_deg - flip.pitch_deg) ** 2))
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ivl.errors import ConfigError
+from ivl.flight.schema import POSE
+from ivl.flight.store import Flight, FloatArray
+from ivl.world import State, Trace, World
+
+MOTION_S = 0.2
+"""Motion is compared up to this long after the trigger, or to the contact."""
+_BEFORE_S = 0.1
+_SETTLED_S = (0.3, 1.0)
+_CONTACT_AFTER_S, _CONTACT_RATE_RADPS, _CONTACT_DROP_RADPS = 0.06, 8.0, 1.5
+_CLIP_SHARE = 0.93
+"""Rates are compared below this share of the gyro's full scale: a log of 16 bits ends before the gyro does."""
+_TRACE_PERIOD_S = 0.002
+_HANGING_DEG = 20.0
+_SHORT_END = {"end.contact_time": 0.1, "end.missed_time": 0.6}
+_GYRO_DEFAULT_RADPS = 34.9
+
+
+@dataclass(frozen=True)
+class Flip:
+    """What a flight recorded of its flip.
+
+    Attributes:
+        label: Of the flight.
+        moment_y_Nmm: Policy's moment, magnitude.
+        rrev_c_per_s: Policy's threshold.
+        h_plane_m: Height of the plane of the cues in W.
+        h_surface_m: Height of the ceiling's surface in W, NaN if it was not measured.
+        state: State at the trigger as the vehicle sensed it; rotor speeds unknown, battery without load if known.
+        climb_mps2: Vertical acceleration before the trigger.
+        t_s: Times of the samples after the trigger that are no repeats, shape (n,).
+        pitch_deg: Nose-up rotation, unwrapped, shape (n,).
+        rate_radps: Nose-up rate, shape (n,).
+        height_m: Sensed height, shape (n,).
+        climb_rate_mps: Sensed vertical velocity, shape (n,).
+        t_contact_s: First sharp fall of the rate, NaN if there is none.
+        hanging_m: Height at which it hangs at the end, inverted and still; NaN if it does not.
+        n_legs: Feet at the end as judged, NaN if nobody did.
+    """
+
+    label: str
+    moment_y_Nmm: float
+    rrev_c_per_s: float
+    h_plane_m: float
+    h_surface_m: float
+    state: State
+    climb_mps2: float
+    t_s: FloatArray
+    pitch_deg: FloatArray
+    rate_radps: FloatArray
+    height_m: FloatArray
+    climb_rate_mps: FloatArray
+    t_contact_s: float
+    hanging_m: float
+    n_legs: float
+
+    def compared(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """Samples of the free rotation: up to `MOTION_S` and before the recorded contact."""
+        end_s = min(MOTION_S, self.t_contact_s) if np.isfinite(self.t_contact_s) else MOTION_S
+        return np.asarray((self.t_s > 0) & (self.t_s <= end_s))
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """The same signals of a simulated flip, at the times of the recorded samples; see `Flip`."""
+
+    pitch_deg: FloatArray
+    rate_radps: FloatArray
+    height_m: FloatArray
+    climb_rate_mps: FloatArray
+    t_contact_s: float
+    trace: Trace
+
+
+def flip(flight: Flight) -> Flip:
+    """The flip of a recorded flight.
+
+    Raises:
+        ConfigError: The flight did not trigger, or lacks what the comparison needs; one line that says what.
+    """
+    _check(flight)
+    t_s = flight["t_s"] - float(flight.info["t_trigger_s"])
+    at = int(np.argmax(t_s >= -1e-9))
+    fresh = _fresh(flight)
+    before = fresh & (t_s > -_BEFORE_S) & (t_s <= t_s[at])
+    after = fresh & (t_s > 0)
+    if before.sum() < 3 or after.sum() < 5:
+        raise ConfigError(f"flight {flight.label}: too few samples around the trigger")
+    climb = float(np.polyfit(t_s[before], flight["v_z_mps"][before], 1)[0])
+    state = State(
+        p_W_m=flight.stack("p", "xyz", "m")[at],
+        v_W_mps=flight.stack("v", "xyz", "mps")[at],
+        q_WB=_unit(flight.stack("q", "xyzw")[at]),
+        w_B_radps=np.mean(flight.stack("w", "xyz", "radps")[before][-3:], axis=0),
+        battery_V=_open_circuit(flight, t_s),
+    )
+    pitch = pitch_deg(flight.stack("q", "xyzw"))
+    pitch -= 360.0 * np.round(pitch[at] / 360.0)
+    rate = -flight["w_y_radps"]
+    return Flip(
+        label=flight.label,
+        moment_y_Nmm=float(flight.info["moment_y_Nmm"]),
+        rrev_c_per_s=float(flight.info["rrev_c_per_s"]),
+        h_plane_m=float(flight.info["h_plane_m"]),
+        h_surface_m=float(flight.info["h_surface_m"]),
+        state=state,
+        climb_mps2=climb,
+        t_s=t_s[after],
+        pitch_deg=pitch[after],
+        rate_radps=rate[after],
+        height_m=flight["p_z_m"][after],
+        climb_rate_mps=flight["v_z_mps"][after],
+        t_contact_s=contact_time(t_s[after], rate[after]),
+        hanging_m=_hanging(flight, pitch),
+        n_legs=float(flight.info["n_legs"]),
+    )
+
+
+def site_overrides(flip: Flip, gap_offset_m: float) -> dict[str, float]:
+    """The ceiling of the room in which the flight was flown.
+
+    Args:
+        flip: The recorded flip.
+        gap_offset_m: `world.sensed_gap_offset` of the vehicle, used where the surface was not measured.
+    """
+    surface_m = flip.h_surface_m if np.isfinite(flip.h_surface_m) else flip.h_plane_m - gap_offset_m
+    return {"world.ceiling_height": surface_m, "world.sensed_gap_offset": flip.h_plane_m - surface_m}
+
+
+def start_state(world: World, flip: Flip) -> State:
+    """The true state at the trigger: what was sensed, `sense.latency` later; rotors that give the recorded climb."""
+    values = world.params.values
+    lag_s = values["sense.latency"]
+    v_W_mps = np.asarray(flip.state.v_W_mps) + np.array([0.0, 0.0, flip.climb_mps2 * lag_s])
+    p_W_m = np.asarray(flip.state.p_W_m) + lag_s * v_W_mps
+    climb_mps = float(v_W_mps[2])
+    force_N = world.derived()["mass_total_kg"] * (values["world.gravity"] + flip.climb_mps2)
+    force_N += values["aero.drag_z"] * climb_mps
+    air = max(1.0 - values["rotor.inflow_loss"] * max(climb_mps, 0.0), 0.1)
+    most = world.derived()["rotor_speed_max_radps"]
+    speed = float(np.sqrt(max(force_N, 0.0) / (4.0 * values["rotor.thrust_constant"] * air)))
+    return replace(flip.state, p_W_m=p_W_m, v_W_mps=v_W_mps, rotor_radps=np.full(4, min(speed, most)))
+
+
+def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> Simulated:
+    """Fly the recorded flip in the simulator, from the state at the trigger.
+
+    Args:
+        world: The vehicle, in the room of the flight (`site_overrides`).
+        flip: The recorded flip.
+        state: Where to start, in place of `start_state`.
+        seed: Of the scatter that the vehicle has.
+    """
+    start = start_state(world, flip) if state is None else state
+    trace = world.trace(2.5, 90.0, 0.0, flip.moment_y_Nmm, seed=seed, start="state", state=start,
+                        period_s=_TRACE_PERIOD_S)  # fmt: skip
+    rows = trace.rows
+    lag_s = world.params.values["sense.latency"]
+    gyro_max = min(world.params.values["sense.gyro_max"], _GYRO_DEFAULT_RADPS)
+    rate = -np.clip(rows.w_B_radps[:, 1], -gyro_max, gyro_max)
+    turned = np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(rows.t_s))))
+    pitch = rows.pitch_deg[0] + np.degrees(turned)
+    sampled = np.interp(flip.t_s, rows.t_s, rate)
+    return Simulated(
+        pitch_deg=np.interp(flip.t_s, rows.t_s, pitch),
+        rate_radps=sampled,
+        height_m=_late(flip, rows.t_s, rows.p_WB_m[:, 2], lag_s),
+        climb_rate_mps=_late(flip, rows.t_s, rows.v_WB_mps[:, 2], lag_s),
+        t_contact_s=contact_time(flip.t_s, sampled),
+        trace=trace,
+    )
+
+
+def short_world(world: World, overrides: Mapping[str, float]) -> World:
+    """The same world without noise, changed as `overrides` say, whose landings end soon after the contact."""
+    quiet = {name: 0.0 for name in _SCATTER if world.params.values[name] > 0.0}
+    changes = {**world.overrides, **quiet, **_SHORT_END, **overrides}
+    return World(world.vehicle, world.gear, world.gear_set, world.sensing, **changes)
+
+
+_SCATTER = ("sense.position_noise", "sense.velocity_noise", "rotor.thrust_scatter", "battery.voltage_scatter",
+            "sense.gyro_noise", "sense.accel_noise", "sense.attitude_noise")  # fmt: skip
+
+
+def clip_rate(rate_radps: FloatArray) -> FloatArray:
+    """Rates as far as every log can tell them."""
+    most = _CLIP_SHARE * _GYRO_DEFAULT_RADPS
+    return np.clip(rate_radps, -most, most)
+
+
+def pitch_deg(q_WB: FloatArray) -> FloatArray:
+    """Nose-up rotation of attitudes, unwrapped over time, degrees.
+
+    Args:
+        q_WB: Unit quaternions x, y, z, w, shape (n, 4).
+    """
+    x, y, z, w = q_WB.T
+    nose_z, up_z = 2.0 * (x * z - w * y), 1.0 - 2.0 * (x * x + y * y)
+    return np.degrees(np.unwrap(np.arctan2(nose_z, up_z)))
+
+
+def contact_time(t_s: FloatArray, rate_radps: FloatArray) -> float:
+    """Middle of the interval in which a flip's rate first falls sharply; NaN if it does not.
+
+    A gyro at its full scale hides a contact, in a recording and in the simulation alike.
+    """
+    rate = clip_rate(rate_radps)
+    for i in range(1, len(t_s)):
+        fast = t_s[i] > _CONTACT_AFTER_S and rate[i - 1] > _CONTACT_RATE_RADPS
+        if fast and rate[i] < rate[i - 1] - _CONTACT_DROP_RADPS:
+            return float(0.5 * (t_s[i] + t_s[i - 1]))
+    return float("nan")
+
+
+def _check(flight: Flight) -> None:
+    for name in ("t_trigger_s", "moment_y_Nmm", "h_plane_m"):
+        if not np.isfinite(flight.info[name]):
+            missing = "it did not trigger" if name == "t_trigger_s" else f"{name} is not known"
+            raise ConfigError(f"flight {flight.label}: {missing}")
+    if not flight.has(*POSE):
+        missing = next(name for name in POSE if not flight.has(name))
+        raise ConfigError(f"flight {flight.label}: column {missing} is not in the log")
+
+
+def _fresh(flight: Flight) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Samples that differ from the one before: a log repeats its last value while nothing new has come."""
+    pose = np.stack([flight[name] for name in POSE], axis=1)
+    changed = (np.diff(pose, axis=0) != 0.0).any(axis=1)
+    return np.concatenate(([True], changed)) & np.isfinite(pose).all(axis=1)
+
+
+def _unit(q_WB: FloatArray) -> FloatArray:
+    return np.asarray(q_WB / np.linalg.norm(q_WB))
+
+
+def _open_circuit(flight: Flight, t_s: FloatArray) -> float | None:
+    """Voltage after the motors were cut; None if the log does not tell."""
+    volts = flight["battery_V"][(t_s > _SETTLED_S[0]) & (t_s < _SETTLED_S[1])]
+    under_load = flight["battery_V"][(t_s > -0.2) & (t_s <= 0.0)]
+    if not np.isfinite(volts).any() or not np.isfinite(under_load).any():
+        return None
+    settled = float(np.nanmedian(volts))
+    return settled if settled > float(np.nanmedian(under_load)) else None
+
+
+def _hanging(flight: Flight, pitch: FloatArray) -> float:
+    """Height over the last tenth of the flight, if the vehicle hangs there inverted and still."""
+    last = slice(-max(len(flight) // 10, 3), None)
+    height = flight["track_p_z_m"] if flight.has("track_p_z_m") else flight["p_z_m"]
+    heights = height[last][np.isfinite(height[last])]
+    inverted = bool((np.abs(pitch[last] % 360.0 - 180.0) < _HANGING_DEG).all())
+    still = bool((np.abs(flight["w_y_radps"][last]) < 2.0).all())
+    return float(np.median(heights)) if len(heights) and inverted and still else float("nan")
+
+
+def _late(flip: Flip, t_s: FloatArray, values: FloatArray, lag_s: float) -> FloatArray:
+    """A signal as it arrives `lag_s` late; before the start it goes on as it was recorded to move."""
+    at = flip.t_s - lag_s
+    slope = (values[1] - values[0]) / (t_s[1] - t_s[0])
+    return np.asarray(np.where(at < 0.0, values[0] + slope * at, np.interp(at, t_s, values)))
