@@ -73,9 +73,9 @@ FRAMES = (
 NOTES = ("Where the app says 0 for a distance, RREV or flow that it has not, nothing is stored.",)
 
 
-def stream(label: str, name: str, table: Table, t_s: FloatArray, given: Given) -> Stream:
+def stream(name: str, table: Table, t_s: FloatArray, given: Given) -> Stream:
     """What one log block or event has (arguments and errors as `streams.make`)."""
-    made = streams.make(label, name, table, t_s, _GROUPS, given)
+    made = streams.make(name, table, t_s, _GROUPS, given)
     columns = dict(made.columns)
     if not any(column.startswith("q_") for column in columns):
         columns |= _attitude(table)
@@ -138,8 +138,8 @@ def _decompressed(table: Table, name: str) -> dict[str, FloatArray]:
 
 def by_folder(
     paths: Sequence[Path], suffixes: Sequence[str], stream_of: Callable[[Path, Given], Stream], given: Given
-) -> tuple[list[Flight], str]:
-    """The flights of files, where those of one folder are parts of one recording, and what their clocks are."""
+) -> tuple[list[Flight], list[Path], str]:
+    """The flights, the files, and what their clocks are; files of one folder are parts of one recording."""
     folders: dict[Path, list[Path]] = {}
     for path in paths:
         for file in streams.files_of(path, suffixes):
@@ -153,7 +153,7 @@ def by_folder(
             members, clock = flights(recording)
             result += members
             clocks[clock] = None
-    return result, " | ".join(clocks)
+    return result, [file for files in folders.values() for file in files], " | ".join(clocks)
 
 
 def flights(members: Sequence[Stream]) -> tuple[list[Flight], str]:
@@ -168,7 +168,7 @@ def _flight(merged: Merged, rows: Any) -> Flight:
     facts = {name: columns.pop(name) for name in _FACTS if name in columns}
     fresh_only(columns)
     first = _trigger(columns, facts)
-    info: dict[str, Any] = {"label": merged.labels[rows[0]]}
+    info: dict[str, Any] = {"label": merged.sources[rows[0]].stem, "source": merged.sources[rows[0]].name}
     if first is not None:
         info["t_trigger_s"] = t_s[first] - t_s[0]
     if "p_z_m" in columns and "d_ceil_m" in columns:

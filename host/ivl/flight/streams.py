@@ -26,14 +26,14 @@ class Stream:
     """Samples of one log block, event or topic.
 
     Attributes:
-        label: What its flights are called.
+        source: File that it comes from.
         name: What the log calls the stream.
         t_s: Its times on the common clock, rising.
         columns: Columns of the schema, and others that the importer needs, by name.
         variables: Everything that it has, as the log names it, also with the name of the stream in front.
     """
 
-    label: str
+    source: Path
     name: str
     t_s: FloatArray
     columns: Mapping[str, FloatArray]
@@ -55,13 +55,13 @@ class Merged:
     Attributes:
         t_s: Times, rising.
         columns: Columns by name.
-        labels: What the stream of each row calls its flights.
+        sources: File that each row comes from.
         clock: What was done, in words.
     """
 
     t_s: FloatArray
     columns: Mapping[str, FloatArray]
-    labels: Sequence[str]
+    sources: Sequence[Path]
     clock: str
 
 
@@ -79,13 +79,10 @@ def files_of(path: Path, suffixes: Sequence[str]) -> list[Path]:
     return files
 
 
-def make(
-    label: str, name: str, table: Table, t_s: FloatArray, groups: Sequence[Sequence[Rule]], given: Given
-) -> Stream:
+def make(name: str, table: Table, t_s: FloatArray, groups: Sequence[Sequence[Rule]], given: Given) -> Stream:
     """What one log block, event or topic has.
 
     Args:
-        label: What its flights are called.
         name: What the log calls the stream.
         table: Its variables.
         t_s: Its times.
@@ -105,7 +102,7 @@ def make(
             if there and not taken and (len(there) == len(group) or parts):
                 chosen = {rule.target: rule for rule in there} | chosen
     variables = [*table.columns, *(f"{name}:{column}" for column in table.columns)]
-    return Stream(label, name, t_s, samples(table, list(chosen.values())), frozenset(variables))
+    return Stream(table.path, name, t_s, samples(table, list(chosen.values())), frozenset(variables))
 
 
 def known(found: Sequence[Stream], given: Given, where: str) -> list[Stream]:
@@ -148,10 +145,10 @@ def merge(streams: Sequence[Stream]) -> Merged:
     for name, members in parts.items():
         t_own_s = np.concatenate([s.t_s for s in members])
         columns[name] = _held(t_s, t_own_s, np.concatenate([s.columns[name] for s in members]))
-    labels = [s.label for s in base for _ in range(len(s.t_s))]
+    sources = [s.source for s in base for _ in range(len(s.t_s))]
     rates = ", ".join(f"{s.name} every {1000 * s.period_s():.3g} ms" for s in streams)
     held = f"; the rows are those of {base[0].name}, the others hold their last value" if len(streams) > 1 else ""
-    return Merged(t_s, columns, labels, rates + held)
+    return Merged(t_s, columns, sources, rates + held)
 
 
 def _providers(streams: Sequence[Stream], name: str) -> list[Stream]:

@@ -21,8 +21,8 @@ _CLOCK = "Timestamp, the vehicle's clock in ms, from the first sample of each fl
 
 def load(paths: Sequence[Path], given: Given) -> Log:
     """Read log blocks, folder by folder."""
-    flights, clock = bitcraze.by_folder(paths, (".csv",), _stream, given)
-    return Log(flights, bitcraze.FRAMES, _CLOCK + clock, notes=bitcraze.NOTES)
+    flights, files, clock = bitcraze.by_folder(paths, (".csv",), _stream, given)
+    return Log(flights, files, bitcraze.FRAMES, _CLOCK + clock, notes=bitcraze.NOTES)
 
 
 FORMAT = Format("cfclient", "CSV of Bitcraze's client: a file, or a folder with a file for each log block", load)
@@ -34,4 +34,4 @@ def _stream(path: Path, given: Given) -> Stream:
     t_ms = table.numbers("Timestamp", needed=True)
     wraps = np.concatenate([[0.0], np.cumsum(np.diff(t_ms) < -_CLOCK_MS / 2)])
     unwrapped = Table(path, {**table.columns, "Timestamp": t_ms + _CLOCK_MS * wraps}, table.places)
-    return bitcraze.stream(path.stem, path.stem, unwrapped, border.clock(unwrapped, "Timestamp", 1e-3), given)
+    return bitcraze.stream(path.stem, unwrapped, border.clock(unwrapped, "Timestamp", 1e-3), given)

@@ -42,8 +42,8 @@ _CLOCK = "The time of the table, from the first sample of each flight on: "
 
 def load(paths: Sequence[Path], given: Given) -> Log:
     """Read tables; those of one folder are topics of one recording."""
-    flights, clock = bitcraze.by_folder(paths, (".csv", ".npz"), _stream, given)
-    return Log(flights, _FRAMES, _CLOCK + clock)
+    flights, files, clock = bitcraze.by_folder(paths, (".csv", ".npz"), _stream, given)
+    return Log(flights, files, _FRAMES, _CLOCK + clock)
 
 
 FORMAT = Format("crazyswarm", "tables of Crazyswarm and Crazyswarm2: recorded states, tf, topics of a bag", load)
@@ -56,4 +56,4 @@ def _stream(path: Path, given: Given) -> Stream:
         found = border.shorten(", ".join(table.columns), 100)
         raise ConfigError(f"{path}: no column of times (known: {', '.join(_TIMES)}); there are {found}")
     t_s = border.clock(table, time, _TIMES[time])
-    return streams.make(path.stem, path.stem, table, t_s, _GROUPS[time], given)
+    return streams.make(path.stem, table, t_s, _GROUPS[time], given)

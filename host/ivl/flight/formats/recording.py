@@ -44,10 +44,17 @@ _CLOCK = "Time of the flight core, from the recorder's first row on."
 def load(paths: Sequence[Path], given: Given) -> Log:
     """Read recordings and run folders."""
     flights: list[Flight] = []
+    files: list[Path] = []
     notes: list[str] = []
     for path in paths:
-        flights += _run(path, given, notes) if path.is_dir() else [_flight(path, {"label": path.stem}, given)]
-    return Log(flights, _FRAMES, _CLOCK, {"rrev_per_s": "not recorded; v_z_mps / d_ceil_m"}, notes)
+        if path.is_dir():
+            recordings = _recordings(path)
+            flights += _run(path, recordings, given, notes)
+            files += [path / "run.sqlite", *recordings]
+        else:
+            flights.append(_flight(path, {"label": path.stem}, given))
+            files.append(path)
+    return Log(flights, files, _FRAMES, _CLOCK, {"rrev_per_s": "not recorded; v_z_mps / d_ceil_m"}, notes)
 
 
 FORMAT = Format("ivl", "this project's flight recorder (`ivl fly --csv`), or a run folder with recordings", load)
@@ -59,16 +66,20 @@ def _flight(path: Path, known: dict[str, Any], given: Given) -> Flight:
     t_s = border.clock(table, "t_s", 1.0)
     columns = border.samples(table, with_rules(_RULES, given, table))
     first, columns["triggered"] = trigger(columns["phase"])
-    info = {"h_plane_m": plane(columns["p_z_m"] + columns["d_ceil_m"]), **known}
+    info = {"h_plane_m": plane(columns["p_z_m"] + columns["d_ceil_m"]), "source": path.name, **known}
     if first is not None:
         info["t_trigger_s"] = t_s[first] - t_s[0]
     return make_flight(info, {"t_s": t_s - t_s[0], **columns})
 
 
-def _run(folder: Path, given: Given, notes: list[str]) -> list[Flight]:
+def _recordings(folder: Path) -> list[Path]:
     files = sorted((folder / RECORDINGS).glob("*.csv"))
     if not files:
-        raise ConfigError(f"{folder}: no recordings: neither a run folder of a vehicle nor a file")
+        raise ConfigError(f"{folder}: no {RECORDINGS}/*.csv: neither a run folder of a vehicle nor a file")
+    return files
+
+
+def _run(folder: Path, files: list[Path], given: Given, notes: list[str]) -> list[Flight]:
     known = _database(folder)
     battery_V = _journal(folder / JOURNAL)
     for name, info in known.items():
@@ -78,7 +89,7 @@ def _run(folder: Path, given: Given, notes: list[str]) -> list[Flight]:
     if strange:
         notes.append(f"{folder}: no rollout belongs to recording {', '.join(strange)}: policy and outcome not known.")
     order = {name: i for i, name in enumerate(known)}
-    files.sort(key=lambda file: (order.get(file.stem, len(order)), file.stem))
+    files = sorted(files, key=lambda file: (order.get(file.stem, len(order)), file.stem))
     return [_flight(file, known.get(file.stem, {"label": file.stem}), given) for file in files]
 
 

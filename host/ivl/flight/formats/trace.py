@@ -39,7 +39,7 @@ _NOTES = ("Position, attitude, velocity and rates are the truth, as estimate and
 
 def load(paths: Sequence[Path], given: Given) -> Log:
     """Read traces, one flight each."""
-    return Log([_flight(path, given) for path in paths], _FRAMES, _CLOCK, notes=_NOTES)
+    return Log([_flight(path, given) for path in paths], paths, _FRAMES, _CLOCK, notes=_NOTES)
 
 
 FORMAT = Format("trace", "time series of `ivl rollout --trace`, .csv or .npz", load)
@@ -53,6 +53,7 @@ def _flight(path: Path, given: Given) -> Flight:
     first, columns["triggered"] = trigger(columns["phase"])
     info: dict[str, Any] = {
         "label": path.stem,
+        "source": path.name,
         "h_plane_m": plane(columns["p_z_m"] + columns["d_ceil_m"]),
         "h_surface_m": plane(columns["p_z_m"] + table.numbers("d_ceil_m", needed=True)),
         "n_legs": sum(_last(table, f"foot_state_{i}") == _STUCK for i in range(1, 5)),

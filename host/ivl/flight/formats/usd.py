@@ -42,13 +42,13 @@ def load(paths: Sequence[Path], given: Given) -> Log:
     clocks: dict[str, None] = {}
     for path in paths:
         found = [
-            bitcraze.stream(path.stem, name, table, border.clock(table, "time", scale), given)
+            bitcraze.stream(name, table, border.clock(table, "time", scale), given)
             for name, table, scale in tables(path)
         ]
         members, clock = bitcraze.flights(streams.known(found, given, str(path)))
         flights += members
         clocks[clock] = None
-    return Log(flights, bitcraze.FRAMES, _CLOCK + " | ".join(clocks), notes=bitcraze.NOTES)
+    return Log(flights, paths, bitcraze.FRAMES, _CLOCK + " | ".join(clocks), notes=bitcraze.NOTES)
 
 
 FORMAT = Format("usd", "binary log of the Crazyflie's micro-SD card", load)
