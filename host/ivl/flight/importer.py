@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ivl.errors import ConfigError
-from ivl.flight import store
+from ivl.flight import checks
 from ivl.flight.formats import by_name
 from ivl.flight.log import Given, Log
 from ivl.flight.schema import SAMPLES
@@ -39,19 +39,14 @@ def run(sources: Sequence[Path], format_name: str, given: Given) -> Flights:
     flights = _unique_labels(flights)
     manifest = Manifest(
         format=format_name,
-        source=_digests(sources),
+        source=[_digest(file, sources) for file in log.files],
         licence=given.licence or "not stated",
         frames=log.frames,
         clock=log.clock,
         absent=_absent(log, flights),
-        notes=list(log.notes),
+        notes=[*log.notes, *checks.notes([f for f in flights if f.info["usable"]])],
     )
     return Flights(manifest, tuple(flights))
-
-
-def write(folder: Path, flights: Flights) -> None:
-    """Write a folder of flights (errors as `store.write`)."""
-    store.write(folder, flights)
 
 
 def _complete(flight: Flight, given: Given) -> Flight:
@@ -97,11 +92,11 @@ def _unique_labels(flights: Sequence[Flight]) -> list[Flight]:
     return result
 
 
-def _digests(sources: Sequence[Path]) -> list[dict[str, str]]:
-    files = [file for path in sources for file in (sorted(path.rglob("*")) if path.is_dir() else [path])]
-    return [
-        {"file": str(file), "sha256": hashlib.sha256(file.read_bytes()).hexdigest()} for file in files if file.is_file()
-    ]
+def _digest(file: Path, sources: Sequence[Path]) -> dict[str, str]:
+    """Name and digest of a file; one out of a folder that was named keeps the name of that folder."""
+    folder = next((path for path in sources if path in file.parents), None)
+    name = f"{folder.resolve().name}/{file.relative_to(folder)}" if folder else file.name
+    return {"file": name, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}
 
 
 def _absent(log: Log, flights: Sequence[Flight]) -> dict[str, str]:

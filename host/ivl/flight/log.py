@@ -56,6 +56,7 @@ class Log:
 
     Attributes:
         flights: In the order flown.
+        files: What was read.
         frames: How the log's frames and signs were turned into those of the schema.
         clock: What the times are, and at which rate samples came.
         absent: Why columns are not there, by name; for the others nobody needs to be told.
@@ -63,6 +64,7 @@ class Log:
     """
 
     flights: Sequence[Flight]
+    files: Sequence[Path]
     frames: str
     clock: str
     absent: Mapping[str, str] = field(default_factory=dict)

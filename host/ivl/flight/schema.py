@@ -78,6 +78,7 @@ FLIGHTS = _table(
     [
         Column("flight", "1", "number of the flight, 0 .. n - 1, in the order flown", "i4"),
         Column("label", "1", "what the log calls it", "str"),
+        Column("source", "1", "name of the file that it was read from", "str"),
         Column("rrev_c_per_s", "1/s", "policy that was flown: trigger threshold"),
         Column("moment_y_Nmm", "N mm", "policy that was flown: nose-up moment, magnitude"),
         Column("speed_mps", "m/s", "approach speed that was asked for"),

@@ -10,7 +10,7 @@ for flight in flights:
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,6 +27,8 @@ from ivl.flight.schema import FLIGHTS, SAMPLES, SCHEMA_VERSION, Column
 FloatArray = npt.NDArray[np.float64]
 
 MANIFEST, FLIGHTS_FILE, SAMPLES_FILE = "manifest.json", "flights.parquet", "samples.parquet"
+_TYPES = {"f8": pa.float64(), "i4": pa.int32(), "str": pa.string(), "bool": pa.bool_()}
+_LINE = 200
 _MANIFEST_FIELDS = ("format", "source", "licence", "frames", "clock", "absent", "notes")
 
 
@@ -141,15 +143,27 @@ def _known(value: Any, column: Column) -> Any:
     return {"f8": float, "i4": int, "str": str, "bool": bool}[column.kind](value)
 
 
+def check_new(folder: Path) -> None:
+    """Refuse a folder that holds something, before the work is done.
+
+    Raises:
+        ConfigError: The folder is not empty, or is a file.
+    """
+    try:
+        if folder.is_symlink() or (folder.exists() and (not folder.is_dir() or any(folder.iterdir()))):
+            raise ConfigError(f"{folder}: is there already: name a new folder")
+    except OSError as error:
+        raise ConfigError(f"{folder}: cannot be written: {error.strerror or error}") from error
+
+
 def write(folder: Path, flights: Flights) -> None:
     """Write a folder of flights: whole, or not at all.
 
     Raises:
         ConfigError: The folder holds something already, or cannot be written.
     """
+    check_new(folder)
     try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise ConfigError(f"{folder}: is there already: name a new folder")
         folder.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent) as name:
             part = Path(name) / "flights"
@@ -187,33 +201,68 @@ def read(folder: Path) -> Flights:
         raise ConfigError(
             f"{folder}: no {MANIFEST}: this is no folder of flights (`ivl flight import` makes one)"
         ) from error
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise ConfigError(f"{path}: cannot be read: {_line(error)}") from error
     version = data.get("schema_version") if isinstance(data, dict) else None
     if version != SCHEMA_VERSION:
         raise ConfigError(f"{path}: schema_version: value {version!r}, this package reads {SCHEMA_VERSION}")
+    manifest = _manifest(path, data)
+    infos = _table(folder / FLIGHTS_FILE, FLIGHTS, FLIGHTS).to_pylist()
+    samples = _table(folder / SAMPLES_FILE, SAMPLES, ("flight", "t_s"))
+    if [info["flight"] for info in infos] != list(range(len(infos))):
+        raise ConfigError(f"{folder / FLIGHTS_FILE}: flights are not numbered 0 .. {len(infos) - 1}")
+    return Flights(manifest, tuple(_flights(infos, samples, folder / SAMPLES_FILE)))
+
+
+def _manifest(path: Path, data: Mapping[str, Any]) -> Manifest:
+    kinds = {"source": list, "absent": dict, "notes": list}
+    for name in _MANIFEST_FIELDS:
+        if not isinstance(data.get(name), kinds.get(name, str)):
+            raise ConfigError(f"{path}: {name}: is missing or of another kind")
+    if not all(isinstance(source, dict) for source in data["source"]):
+        raise ConfigError(f"{path}: source: a file is no object")
+    return Manifest(**{name: data[name] for name in _MANIFEST_FIELDS})
+
+
+def _table(path: Path, known: Mapping[str, Column], needed: Iterable[str]) -> pa.Table:
+    """A Parquet file whose columns are of the schema; those of `needed` are there."""
     try:
-        manifest = Manifest(**{name: data[name] for name in _MANIFEST_FIELDS})
-        infos = pq.read_table(folder / FLIGHTS_FILE, schema=_schema(FLIGHTS)).to_pylist()
-        table = pq.read_table(folder / SAMPLES_FILE)
-    except (OSError, KeyError, TypeError, pa.ArrowException) as error:
-        raise ConfigError(f"{folder}: damaged or not written by this package: {error}") from error
-    return Flights(manifest, tuple(_flight(info, table, folder) for info in infos))
+        table = pq.ParquetFile(path).read()
+        table.validate(full=True)
+    except (OSError, ValueError, pa.ArrowException) as error:
+        raise ConfigError(f"{path}: cannot be read: {_line(error)}") from error
+    for name in needed:
+        if name not in table.column_names:
+            raise ConfigError(f"{path}: column {name} is missing")
+    for name in table.column_names:
+        if name not in known or table.schema.field(name).type != _TYPES[known[name].kind]:
+            raise ConfigError(f"{path}: column {name} is none of version {SCHEMA_VERSION}, or of another type")
+    return table
 
 
-def _flight(info: Mapping[str, Any], table: pa.Table, folder: Path) -> Flight:
+def _flights(infos: Sequence[Mapping[str, Any]], table: pa.Table, path: Path) -> Iterator[Flight]:
     numbers = table.column("flight").to_numpy()
-    rows = np.flatnonzero(numbers == info["flight"])
-    if not len(rows):
-        raise ConfigError(f"{folder / SAMPLES_FILE}: flight {info['flight']} ({info['label']}) has no samples")
-    part = table.slice(int(rows[0]), len(rows))
-    return make_flight(info, {name: part.column(name).to_numpy() for name in part.column_names if name != "flight"})
+    if (np.diff(numbers) < 0).any():
+        raise ConfigError(f"{path}: the flights are not in order")
+    for info in infos:
+        first, end = np.searchsorted(numbers, [info["flight"], info["flight"] + 1])
+        part = table.slice(int(first), int(end - first))
+        columns = {name: part.column(name).to_numpy() for name in part.column_names if name != "flight"}
+        try:
+            yield make_flight(info, columns)
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {error}") from error
+
+
+def _line(error: BaseException) -> str:
+    """What an error says, in one line of reasonable length."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= _LINE else text[: _LINE - 3] + "..."
 
 
 def _schema(columns: Mapping[str, Column]) -> pa.Schema:
-    types = {"f8": pa.float64(), "i4": pa.int32(), "str": pa.string(), "bool": pa.bool_()}
     fields = [
-        pa.field(c.name, types[c.kind], nullable=False, metadata={"unit": c.unit, "doc": c.doc})
+        pa.field(c.name, _TYPES[c.kind], nullable=False, metadata={"unit": c.unit, "doc": c.doc})
         for c in columns.values()
     ]
     return pa.schema(fields, metadata={"ivl_schema_version": str(SCHEMA_VERSION)})

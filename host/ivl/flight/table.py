@@ -6,9 +6,12 @@ All importers read their files through this module, so that each kind of damage 
 
 import csv
 import io
+import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,11 +24,14 @@ IntArray = npt.NDArray[np.intp]
 Values = Sequence[str] | FloatArray
 
 LIMITS = {
-    "s": 1e9, "m": 1e4, "m/s": 1e4, "rad/s": 1e6, "m/s^2": 1e5, "1/s": 1e6, "N": 1e4, "N m": 1e4, "V": 1e4, "1": 1e6,
+    "s": 1e11, "m": 1e4, "m/s": 1e4, "rad/s": 1e6, "m/s^2": 1e5, "1/s": 1e6, "N": 1e4, "N m": 1e4, "V": 1e4, "1": 1e6,
 }  # fmt: skip
 """Largest magnitude of a number by its unit. No vehicle comes near; a number beyond it is damage."""
 _NORM_SLACK = 0.1
 _SHOWN = 40
+_NPZ_BYTES_MAX = 2**30
+_NPZ_ERRORS = (ValueError, OSError, EOFError, LookupError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""What numpy and zipfile raise for damaged archives; NotImplementedError is a RuntimeError."""
 _MAGIC = {
     b"\x1f\x8b": "is compressed (gzip): unpack it first",
     b"PK": "is a ZIP archive, not text",
@@ -43,12 +49,14 @@ class Rule:
         variable: Column of the log.
         scale: Factor from the log's unit and sign to the schema's.
         needed: Every sample must have a number; otherwise an empty cell or "nan" stands for "unknown".
+        nothing: Number of the log that stands for "unknown".
     """
 
     target: str
     variable: str
     scale: float = 1.0
     needed: bool = False
+    nothing: float | None = None
 
 
 def rules(
@@ -240,6 +248,41 @@ def read_csv(path: Path) -> Table:
     return make_table(path, header_of(path, rows[0]), rows[1:])
 
 
+def read_npz(path: Path) -> Table:
+    """An archive of numpy arrays; vectors become a column for each component: "pos_1", "pos_2" ...
+
+    Raises:
+        ConfigError: It is none, it is too large, or its arrays are no numbers of one length.
+    """
+    data = read_bytes(path)
+    arrays = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > _NPZ_BYTES_MAX:
+            raise ConfigError(f"{path}: unpacks to {size} bytes (allowed {_NPZ_BYTES_MAX})")
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except _NPZ_ERRORS as error:
+        raise ConfigError(f"{path}: is no archive of numpy arrays: {shorten(str(error), 100)}") from error
+    return _of_arrays(path, arrays)
+
+
+def _of_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> Table:
+    columns: dict[str, Values] = {}
+    lengths = {name: array.shape[0] if array.ndim else -1 for name, array in arrays.items()}
+    n = next(iter(lengths.values()), 0)
+    for name, array in arrays.items():
+        if array.dtype.kind not in "iufb" or array.ndim not in (1, 2) or lengths[name] != n:
+            raise ConfigError(f"{path}: {name}: is no column of {n} numbers, but {array.dtype} of shape {array.shape}")
+        parts = array.reshape(n, -1) if n else array.reshape(0, 1)
+        for i in range(parts.shape[1]):
+            columns[name if array.ndim == 1 else f"{name}_{i + 1}"] = parts[:, i].astype(np.float64)
+    if not n:
+        raise ConfigError(f"{path}: holds no data")
+    return Table(path, columns, np.arange(1, n + 1), "row")
+
+
 def clock(table: Table, name: str, scale: float) -> FloatArray:
     """Times in seconds, rising strictly.
 
@@ -264,7 +307,10 @@ def samples(table: Table, rules: Sequence[Rule]) -> dict[str, FloatArray]:
     """
     result = {}
     for rule in rules:
-        values = table.numbers(rule.variable, rule.needed) * rule.scale
+        values = table.numbers(rule.variable, rule.needed)
+        if rule.nothing is not None:
+            values = np.where(values == rule.nothing, np.nan, values)
+        values = values * rule.scale
         _limit(table, values, SAMPLES[rule.target].unit, rule.variable)
         result[rule.target] = values
     for stem in ("q", "track_q"):

@@ -46,7 +46,7 @@ def import_(
 ) -> None:
     """Import; HELP is the text that people see."""
     try:
-        from ivl.flight import importer, log
+        from ivl.flight import importer, log, store
     except ModuleNotFoundError as error:
         raise IvlError(f"{error.name} is not installed: pip install 'ivl[flight]'") from error
     if attempts not in (log.LAST, log.ALL):
@@ -55,9 +55,13 @@ def import_(
         licence, rrev, moment, speed, angle, h_plane, h_surface, _outcomes(outcome), judged_by, attempts,
         [log.parse_rule(text) for text in maps or []],
     )  # fmt: skip
+    store.check_new(out)
     flights = importer.run(sources, format_name, given)
-    importer.write(out, flights)
+    store.write(out, flights)
     counts = {"flights": len(flights), "usable": len(flights.usable()), "samples": sum(len(f) for f in flights)}
+    for note in flights.manifest.notes:
+        if note.startswith("WARNING"):
+            console.err.print(note, style="yellow", highlight=False, markup=False, soft_wrap=True)
     if as_json:
         console.print_json({"folder": str(out), **counts, "notes": list(flights.manifest.notes)})
         return

@@ -1,6 +1,7 @@
 """`ivl flight show`."""
 
 import math
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -37,7 +38,10 @@ def show(
         known = ("format", "source", "licence", "frames", "clock", "absent", "notes")
         console.print_json({"folder": str(folder), **{k: getattr(manifest, k) for k in known}, "flights": rows})
         return
-    console.out.print(_table(rows))
+    for source, group in groupby(rows, key=lambda row: str(row["source"])):
+        if len(manifest.source) > 1:
+            console.out.print(source, highlight=False, markup=False)
+        console.out.print(_table(list(group)))
     for row in rows:
         text = ("" if row["usable"] else "NOT USABLE: ") + row["note"]
         if text:
@@ -48,7 +52,7 @@ def show(
     facts = {
         "flights": f"{len(flights)}, {len(usable)} usable; feet at the end of the usable ones: {outcomes}",
         "format": manifest.format,
-        "source": ", ".join(str(source["file"]) for source in manifest.source),
+        "source": ", ".join(str(source.get("file")) for source in manifest.source),
         "licence": manifest.licence,
         "frames": manifest.frames,
         "clock": manifest.clock,
@@ -67,12 +71,12 @@ def _row(info: Any, n: int, duration_s: float) -> dict[str, Any]:
 
 
 def _table(rows: list[dict[str, Any]]) -> Table:
-    """For 80 columns: only the judge is cut off where there is no room."""
+    """For 80 columns: where there is no room, names are wrapped, and numbers stay whole."""
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("flight", overflow="fold")
     for name in ("RREV_c", "M_yd", "m/s", "deg", "samples", "s", "legs"):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("judged by", overflow="ellipsis", no_wrap=True)
+    table.add_column("judged by", overflow="fold")
     for row in rows:
         table.add_row(
             row["label"],

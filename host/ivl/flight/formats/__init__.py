@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from ivl.errors import ConfigError
-from ivl.flight.formats import habas2021
+from ivl.flight.formats import cfclient, crazyswarm, habas2021, recording, trace, usd
 from ivl.flight.log import Format
 
-FORMATS: Mapping[str, Format] = MappingProxyType({module.FORMAT.name: module.FORMAT for module in (habas2021,)})
+_MODULES = (habas2021, recording, trace, cfclient, crazyswarm, usd)
+FORMATS: Mapping[str, Format] = MappingProxyType({module.FORMAT.name: module.FORMAT for module in _MODULES})
 
 
 def by_name(name: str) -> Format:

@@ -30,10 +30,8 @@ _REWARD_PER_M = 10 / 2.10
 """Return per metre of the highest point; the rest of the return is for the feet."""
 _FEET_BY_REWARD = ((75.0, 4), (15.0, 2), (5.0, 1))
 """Smallest return for the feet, and the feet that it stands for; none below."""
-_NEEDED = (
-    *("k_ep", "k_run", "policy", "reward", "flip_flag", "t"),
-    *("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"),
-)
+_STATE = ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz")
+_NEEDED = ("k_ep", "k_run", "policy", "reward", "flip_flag", "t", *_STATE)
 _RULES = (
     *rules("p", "xyz", "m", "{}", needed=True),
     *rules("v", "xyz", "mps", "v{}", needed=True),
@@ -70,7 +68,8 @@ _NOTES = (
     "The vehicle sent numbers of 16 bits: rates, RREV and optical flow end at 32.767 and mean 'at least' there.",
     "The tracking loses the vehicle in most flips, and confuses two attitudes in single frames: smooth track_q or "
     "leave it.",
-    "n_legs is read from the return: 100 or 150 for the feet is 4 (three or four), 25 or 50 is 2 (one or two).",
+    "n_legs is read from the return, less 10 / 2.1 per metre of height: 100 or 150 is 4 (three or four feet), 25 or 50 "
+    "is 2 (one or two). It is the judgement of the people who flew.",
 )
 
 
@@ -99,7 +98,7 @@ def load(paths: Sequence[Path], given: Given) -> Log:
     notes = list(_NOTES)
     for path in paths:
         flights += _read(path, given, notes)
-    return Log(flights, _FRAMES, _CLOCK, _ABSENT, notes)
+    return Log(flights, paths, _FRAMES, _CLOCK, _ABSENT, notes)
 
 
 FORMAT = Format("habas2021", "the study's CSV of 2021: many rollouts in one file, 100 Hz", load)
@@ -176,11 +175,12 @@ def _plane(samples: Table) -> float:
 
 
 def _flight(attempt: _Attempt, samples: Table, summaries: Table | None, h_plane_m: float, given: Given) -> Flight:
-    part = samples.take(attempt.rows)
+    part = samples.take(attempt.rows[_n_empty(samples, attempt.rows) :])
     t_s = border.clock(part, "t", 1.0)
     columns = border.samples(part, with_rules(_RULES, given, part))
     fresh_only(columns)
-    info: dict[str, Any] = {"label": f"ep{attempt.key[0]}-run{attempt.key[1]}", "h_plane_m": h_plane_m}
+    info: dict[str, Any] = {"label": "ep{}-run{}".format(*attempt.key), "source": part.path.name}
+    info["h_plane_m"] = h_plane_m
     if not (attempt.last and attempt.number == 1) and given.attempts == ALL:
         info["label"] += f"-try{attempt.number}"
     triggered, by_command = _triggered(part, columns)
@@ -196,6 +196,13 @@ def _flight(attempt: _Attempt, samples: Table, summaries: Table | None, h_plane_
         notes.append("no summary row: outcome not known")
     flight = make_flight(info, {"t_s": t_s - t_s[0], **columns})
     return _judge(flight, notes)
+
+
+def _n_empty(samples: Table, rows: IntArray) -> int:
+    """Number of rows at the beginning that were written before the vehicle had sent its first packet."""
+    part = samples.take(rows[:-1])
+    empty = [(part.numbers(name) == (name == "qw")).astype(bool) for name in _STATE if name in part.columns]
+    return int(np.argmin([*np.all(empty, axis=0), False]))
 
 
 def _triggered(part: Table, columns: dict[str, FloatArray]) -> tuple[npt.NDArray[np.bool_], bool]:
@@ -243,7 +250,7 @@ def _summary(summaries: Table, row: int, notes: list[str]) -> dict[str, Any]:
     feet = reward - _REWARD_PER_M * z_max_m
     if np.isfinite(feet):
         n_legs = next((n for least, n in _FEET_BY_REWARD if feet >= least), 0)
-        info |= {"reward": reward, "n_legs": n_legs, "judged_by": f"return, {abs(round(feet))} for the feet"}
+        info |= {"reward": reward, "n_legs": n_legs, "judged_by": f"reward {abs(round(feet))}"}
     error = one.text("Error")[0] if "Error" in one.columns else ""
     if error and not error.startswith("Rollout Completed"):
         info["usable"] = False
