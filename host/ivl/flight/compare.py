@@ -202,7 +202,7 @@ def compare(
         rows.append(Row(flip, motion.fly(quiet, flip), rates, class_of(flip.n_legs)))
         if progress:
             progress(number + 1, len(found))
-    home = World(vehicle, gear, gear_set, **changes)
+    home = World(vehicle, gear, gear_set, None, **changes)
     windows = tuple(_window(home, group, moment) for moment, group in _groups(found))
     at_policies = tuple((rrev, moment, _rate(home, rrev, moment, 4 * _WINDOW_ROLLOUTS)) for rrev, moment in policies)
     return Comparison(tuple(rows), tuple(left_out), windows, at_policies)
@@ -210,9 +210,9 @@ def compare(
 
 def world_of(flip: Flip, vehicle: str, gear: str, gear_set: str, overrides: dict[str, float]) -> World:
     """The vehicle in the room of the flight."""
-    there = World(vehicle, gear, gear_set, **overrides)
+    there = World(vehicle, gear, gear_set, None, **overrides)
     room = motion.site_overrides(flip, there.params.values["world.sensed_gap_offset"])
-    return World(vehicle, gear, gear_set, **{**overrides, **room})
+    return World(vehicle, gear, gear_set, None, **{**overrides, **room})
 
 
 def motion_errors(pairs: Sequence[tuple[Flip, Simulated]]) -> dict[str, Any]:

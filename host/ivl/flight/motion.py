@@ -1,7 +1,8 @@
 """The flip as it was recorded, and the same flip flown by the simulator.
 
 Both sides are what the vehicle itself would log: attitude and rate from the gyro, clipped where the gyro clips; height
-and climb as the state estimate gives them, `sense.latency` late. Time runs from the trigger.
+and climb as the state estimate gives them, late by `sense.latency` and by half a period for which a pose is held. The
+trigger fires when a pose arrives, so that one is `sense.latency` old. Time runs from the trigger.
 
     flip = motion.flip(flight)
     simulated = motion.fly(world, flip)
@@ -94,7 +95,7 @@ def flip(flight: Flight) -> Flip:
         ConfigError: The flight did not trigger, or lacks what the comparison needs; one line that says what.
     """
     _check(flight)
-    t_s = flight["t_s"] - float(flight.info["t_trigger_s"])
+    t_s = flight["t_s"] - (float(flight.info["t_trigger_s"]) - _trigger_age(flight))
     at = int(np.argmax(t_s >= -1e-9))
     fresh = _fresh(flight)
     before = fresh & (t_s > -_BEFORE_S) & (t_s <= t_s[at])
@@ -170,8 +171,9 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
     trace = world.trace(2.5, 90.0, 0.0, flip.moment_y_Nmm, seed=seed, start="state", state=start,
                         period_s=_TRACE_PERIOD_S)  # fmt: skip
     rows = trace.rows
-    lag_s = world.params.values["sense.latency"]
-    gyro_max = min(world.params.values["sense.gyro_max"], _GYRO_DEFAULT_RADPS)
+    values = world.params.values
+    lag_s = values["sense.latency"] + 0.5 / values["sense.pose_rate"]
+    gyro_max = min(values["sense.gyro_max"], _GYRO_DEFAULT_RADPS)
     rate = -np.clip(rows.w_B_radps[:, 1], -gyro_max, gyro_max)
     turned = np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(rows.t_s))))
     pitch = rows.pitch_deg[0] + np.degrees(turned)
@@ -181,7 +183,7 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
         rate_radps=sampled,
         height_m=_late(flip, rows.t_s, rows.p_WB_m[:, 2], lag_s),
         climb_rate_mps=_late(flip, rows.t_s, rows.v_WB_mps[:, 2], lag_s),
-        t_contact_s=contact_time(flip.t_s, sampled),
+        t_contact_s=_contact_within(rows.t_s, rate, float(np.median(np.diff(flip.t_s)))),
         trace=trace,
     )
 
@@ -200,7 +202,7 @@ _SCATTER = ("sense.position_noise", "sense.velocity_noise", "rotor.thrust_scatte
 def clip_rate(rate_radps: FloatArray) -> FloatArray:
     """Rates as far as every log can tell them."""
     most = _CLIP_SHARE * _GYRO_DEFAULT_RADPS
-    return np.clip(rate_radps, -most, most)
+    return np.asarray(np.clip(rate_radps, -most, most))
 
 
 def pitch_deg(q_WB: FloatArray) -> FloatArray:
@@ -211,7 +213,7 @@ def pitch_deg(q_WB: FloatArray) -> FloatArray:
     """
     x, y, z, w = q_WB.T
     nose_z, up_z = 2.0 * (x * z - w * y), 1.0 - 2.0 * (x * x + y * y)
-    return np.degrees(np.unwrap(np.arctan2(nose_z, up_z)))
+    return np.asarray(np.degrees(np.unwrap(np.arctan2(nose_z, up_z))))
 
 
 def contact_time(t_s: FloatArray, rate_radps: FloatArray) -> float:
@@ -225,6 +227,20 @@ def contact_time(t_s: FloatArray, rate_radps: FloatArray) -> float:
         if fast and rate[i] < rate[i - 1] - _CONTACT_DROP_RADPS:
             return float(0.5 * (t_s[i] + t_s[i - 1]))
     return float("nan")
+
+
+def _contact_within(t_s: FloatArray, rate_radps: FloatArray, period_s: float) -> float:
+    """As `contact_time`, for a signal that is finer than the recording: what a sample every `period_s` would show."""
+    rate = clip_rate(rate_radps)
+    earlier = np.interp(t_s - period_s, t_s, rate)
+    falls = (t_s > _CONTACT_AFTER_S) & (earlier > _CONTACT_RATE_RADPS) & (rate < earlier - _CONTACT_DROP_RADPS)
+    return float(t_s[np.argmax(falls)]) if falls.any() else float("nan")
+
+
+def _trigger_age(flight: Flight) -> float:
+    """Time from the trigger to the first sample after it; half a period where the log does not tell."""
+    known = float(flight.info["trigger_age_s"])
+    return known if np.isfinite(known) else 0.5 * float(np.median(np.diff(flight["t_s"])))
 
 
 def _check(flight: Flight) -> None:

@@ -86,6 +86,7 @@ FLIGHTS = _table(
         Column("h_plane_m", "m", "height of the plane that the vehicle computed its cues for, in W"),
         Column("h_surface_m", "m", "height of the ceiling's surface in W, where it was measured"),
         Column("t_trigger_s", "s", "time of the first sample after the trigger; NaN: it did not trigger"),
+        Column("trigger_age_s", "s", "how long before that sample the trigger fired, as far as the log can tell"),
         Column(
             "n_legs",
             "1",

@@ -83,6 +83,7 @@ class _Attempt:
         last: No other attempt follows.
         rows: Its samples.
         summary: Its row in the table of summaries, None: it has none.
+        snapshot: Its row in the table of what the vehicle latched at the trigger, None: it has none.
     """
 
     key: tuple[str, str]
@@ -90,6 +91,7 @@ class _Attempt:
     last: bool
     rows: IntArray
     summary: int | None
+    snapshot: int | None
 
 
 def load(paths: Sequence[Path], given: Given) -> Log:
@@ -105,63 +107,62 @@ FORMAT = Format("habas2021", "the study's CSV of 2021: many rollouts in one file
 
 
 def _read(path: Path, given: Given, notes: list[str]) -> list[Flight]:
-    samples, summaries, order = _tables(path)
+    (samples, *others), order = _tables(path)
     t_s = samples.numbers("t", needed=True)
     if len(t_s) > 1 and (t_s == t_s[0]).all():
         t_s = np.arange(len(t_s), dtype=np.float64) * _PERIOD_S
         samples = Table(path, {**samples.columns, "t": t_s}, samples.places)
         notes.append(f"{path.name}: the clock of the log stands still; its rows are taken to be 10 ms apart.")
-    attempts = [a for a in _attempts(samples, summaries, order, t_s) if a.last or given.attempts == ALL]
+    attempts = [a for a in _attempts(samples, others, order, t_s) if a.last or given.attempts == ALL]
     h_plane_m = _plane(samples) if "RREV" in samples.columns else float("nan")
-    return [_flight(attempt, samples, summaries, h_plane_m, given) for attempt in attempts]
+    return [_flight(attempt, samples, others, h_plane_m, given) for attempt in attempts]
 
 
-def _tables(path: Path) -> tuple[Table, Table | None, list[tuple[int, int]]]:
-    """Samples, summaries, and the order in which both stand: (0, sample) or (1, summary)."""
+def _tables(path: Path) -> tuple[list[Table], list[tuple[int, int]]]:
+    """Samples, summaries and snapshots, and the order in which they stand: (number of the table, row)."""
     rows = [(line, row) for line, row in border.read_rows(path) if any(row) and not _is_note(row)]
     if not rows:
         raise ConfigError(f"{path}: is empty")
     names = border.header_of(path, rows[0])
     Table(path, dict.fromkeys(names, ()), np.zeros(0, dtype=np.intp)).need(_NEEDED, "habas2021")
     where = names.index("policy")
-    rows = [(line, row) for line, row in rows[1:] if "Impact Data" not in row and "Flip Data" not in row]
-    kinds = [int(len(row) == len(names) and row[where] != "") for _, row in rows]
-    parts: list[list[tuple[int, list[str]]]] = [[], []]
+    parts: list[list[tuple[int, list[str]]]] = [[], [], []]
     order = []
-    for kind, row in zip(kinds, rows, strict=True):
+    for line, row in rows[1:]:
+        if "Impact Data" in row:
+            continue
+        kind = 2 if "Flip Data" in row else int(len(row) == len(names) and row[where] != "")
         order.append((kind, len(parts[kind])))
-        parts[kind].append(row)
-    return (
-        border.make_table(path, names, parts[0]),
-        border.make_table(path, names, parts[1]) if parts[1] else None,
-        order,
-    )
+        parts[kind].append((line, row))
+    return [border.make_table(path, names, part) for part in parts], order
 
 
 def _is_note(row: list[str]) -> bool:
     return row[0] in ("EXP", "SIM") and len(row) > 1 and row[1].startswith("Note")
 
 
-def _attempts(samples: Table, summaries: Table | None, order: list[tuple[int, int]], t_s: FloatArray) -> list[_Attempt]:
+def _attempts(samples: Table, others: list[Table], order: list[tuple[int, int]], t_s: FloatArray) -> list[_Attempt]:
     """Attempts in the order flown: one ends with its summary, with another rollout, or with a jump of the clock."""
-    keys = [list(zip(t.text("k_ep"), t.text("k_run"), strict=True)) if t else [] for t in (samples, summaries)]
-    pieces: list[tuple[tuple[str, str], list[int], int | None]] = []
+    keys = [list(zip(t.text("k_ep"), t.text("k_run"), strict=True)) for t in (samples, *others)]
+    pieces: list[tuple[tuple[str, str], list[int], int | None, int | None]] = []
     is_open = False
     for kind, i in order:
         key = keys[kind][i]
         goes_on = is_open and pieces[-1][0] == key
         if kind == 0:
             if not goes_on or abs(t_s[i] - t_s[i - 1]) > GAP_S:
-                pieces.append((key, [], None))
+                pieces.append((key, [], None, None))
             pieces[-1][1].append(i)
-        else:
-            pieces.append((key, pieces.pop()[1] if goes_on else [], i))
+        elif kind == 1:
+            pieces.append((key, pieces.pop()[1] if goes_on else [], i, None))
+        elif pieces and pieces[-1][0] == key:
+            pieces.append((*pieces.pop()[:3], i))
         is_open = kind == 0
-    last = {key: n for n, (key, _, _) in enumerate(pieces)}
+    last = {key: n for n, (key, *_) in enumerate(pieces)}
     result = []
-    for n, (key, rows, summary) in enumerate(pieces):
-        number = 1 + sum(before == key for before, _, _ in pieces[:n])
-        result.append(_Attempt(key, number, last[key] == n, np.array(rows, dtype=np.intp), summary))
+    for n, (key, rows, summary, snapshot) in enumerate(pieces):
+        number = 1 + sum(before == key for before, *_ in pieces[:n])
+        result.append(_Attempt(key, number, last[key] == n, np.array(rows, dtype=np.intp), summary, snapshot))
     return [attempt for attempt in result if len(attempt.rows)]
 
 
@@ -174,7 +175,7 @@ def _plane(samples: Table) -> float:
     return round(float(np.median(z[telling] + vz[telling] / rrev[telling])), 3)
 
 
-def _flight(attempt: _Attempt, samples: Table, summaries: Table | None, h_plane_m: float, given: Given) -> Flight:
+def _flight(attempt: _Attempt, samples: Table, others: list[Table], h_plane_m: float, given: Given) -> Flight:
     part = samples.take(attempt.rows[_n_empty(samples, attempt.rows) :])
     t_s = border.clock(part, "t", 1.0)
     columns = border.samples(part, with_rules(_RULES, given, part))
@@ -188,14 +189,30 @@ def _flight(attempt: _Attempt, samples: Table, summaries: Table | None, h_plane_
     first = int(np.argmax(triggered)) if triggered.any() else None
     if first is not None:
         info["t_trigger_s"] = t_s[first] - t_s[0]
+        info["trigger_age_s"] = _trigger_age(columns["p_z_m"], t_s, first, others[1], attempt.snapshot)
     notes = ["flip_flag never set: trigger and moment read from the commands"] if by_command else []
     info |= _asked(columns, first, by_command)
-    if summaries is not None and attempt.summary is not None:
-        info |= _summary(summaries, attempt.summary, notes)
+    if attempt.summary is not None:
+        info |= _summary(others[0], attempt.summary, notes)
     else:
         notes.append("no summary row: outcome not known")
     flight = make_flight(info, {"t_s": t_s - t_s[0], **columns})
     return _judge(flight, notes)
+
+
+def _trigger_age(height_m: FloatArray, t_s: FloatArray, first: int, snapshots: Table, row: int | None) -> float:
+    """How long before sample `first` the vehicle triggered: when it was at the height that its snapshot holds.
+
+    A row tells what came within the 10 ms before it, so half of that is added.
+    """
+    back = slice(max(first - 4, 0), first + 1)
+    near = height_m[back]
+    if row is None or "z" not in snapshots.columns or (np.diff(near) < 0).any():
+        return _PERIOD_S / 2
+    latched_m = float(snapshots.take(np.array([row])).numbers("z")[0])
+    if not near[0] <= latched_m <= near[-1]:
+        return _PERIOD_S / 2
+    return float(t_s[first] - np.interp(latched_m, near, t_s[back])) + _PERIOD_S / 2
 
 
 def _n_empty(samples: Table, rows: IntArray) -> int:

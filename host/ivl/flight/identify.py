@@ -1,0 +1,432 @@
+"""The vehicle that flew: parameters from recorded motion, never from outcomes.
+
+Least squares over flights (scipy's trust-region method), with the values of the vehicle file as a prior: value and
+`sigma` of each fitted parameter, and the ranges of the parameter table as bounds.
+
+    residuals of a flight   pitch, rate, sensed height from the trigger to 200 ms or the contact; time of the contact
+    of all flights          mean height at which the vehicle hung inverted and still
+    weights                 the spread of each kind of residual, estimated from the fit itself, and the number of
+                            samples that are worth one independent look
+
+Samples of one flight are alike: its whole motion shifts with the trigger's jitter. Intervals therefore come from
+resampling whole flights, each time solved anew with the fit's own derivatives. What all flights share is drawn about
+itself instead: the prior, and the hanging height, which is as uncertain as the place of the tracked point in the body.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares  # type: ignore[import-untyped]
+
+from ivl import model, native
+from ivl.errors import ConfigError
+from ivl.flight import compare, motion
+from ivl.flight.motion import Flip
+from ivl.flight.store import Flights, FloatArray
+from ivl.world import World
+
+KINDS = ("pitch", "rate", "height", "contact")
+"""Kinds of residuals, in the order of the residual vector of a flight."""
+_START_SPREAD = {"pitch": 4.0, "rate": 1.0, "height": 0.01, "contact": 0.006}
+_LEAST_SPREAD = {"pitch": 0.3, "rate": 0.1, "height": 0.001, "contact": 0.002}
+"""Units: degrees, rad/s, m, s. A fit never claims to be better than the least."""
+_LOOKS = {"pitch": 3.0, "rate": 3.0, "height": 3.0, "contact": 1.0}
+"""Independent looks that the samples of one flight are worth together."""
+_CONTACT_FAR_S = 0.04
+_HANGING_SIGMA_M = 0.01
+"""Of the tracked point above the centre of mass, twice: it hangs as far below as it flew above."""
+_ROUNDS, _EVALUATIONS = 3, 20
+_STEP = 0.02
+"""For derivatives, in units of the prior's spread: motion is smooth, the time of a contact is not."""
+_RESAMPLES = 1000
+_ALIKE, _SILENT = 0.9, 0.8
+_FITTED_GROUPS = ("world", "body", "rotor", "battery", "aero", "sense", "prop_plate", "base_plate", "plate")
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of a parameter before the flights.
+
+    Attributes:
+        value: In the unit of the parameter table.
+        sigma: Standard deviation; infinite if the file gives none.
+        lo: Smallest allowed value.
+        hi: Largest allowed value.
+    """
+
+    value: float
+    sigma: float
+    lo: float
+    hi: float
+
+    @property
+    def scale(self) -> float:
+        """Size of a typical change, for the solver."""
+        if np.isfinite(self.sigma):
+            return self.sigma
+        return abs(self.value) / 10 or (self.hi - self.lo) / 100
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter: value, standard deviation and 95 % interval, with its prior."""
+
+    name: str
+    unit: str
+    prior: Prior
+    value: float
+    sigma: float
+    interval: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Result of a fit.
+
+    Attributes:
+        estimates: Fitted parameters.
+        correlation: Of the estimates, shape (n, n).
+        used: Labels of the flights that were fitted.
+        held_out: Labels of those that were not.
+        spread: Spread of each kind of residual.
+        before: Motion errors of the vehicle as it was, of fitted and held-out flights.
+        after: The same of the fitted vehicle.
+        words: What the flights cannot tell, one sentence each.
+        left_out: Flights that could not be used, one line each.
+    """
+
+    estimates: tuple[Estimate, ...]
+    correlation: FloatArray
+    used: tuple[str, ...]
+    held_out: tuple[str, ...]
+    spread: Mapping[str, float]
+    before: Mapping[str, Any]
+    after: Mapping[str, Any]
+    words: tuple[str, ...]
+    left_out: tuple[str, ...]
+
+    def overrides(self) -> dict[str, float]:
+        """The fitted values, as overrides of a world."""
+        return {estimate.name: estimate.value for estimate in self.estimates}
+
+    def summary(self) -> dict[str, Any]:
+        """Every figure by name, ready for JSON."""
+        return {
+            "n_flights": len(self.used),
+            "held_out": list(self.held_out),
+            "left_out": list(self.left_out),
+            "parameters": {
+                e.name: {"unit": e.unit, "prior": e.prior.value,
+                         "prior_sigma": e.prior.sigma if np.isfinite(e.prior.sigma) else None,
+                         "value": e.value, "sigma": e.sigma, "interval_95": list(e.interval)}
+                for e in self.estimates
+            },
+            "correlation": self.correlation.tolist(),
+            "spread": dict(self.spread),
+            "before": dict(self.before),
+            "after": dict(self.after),
+            "words": list(self.words),
+        }  # fmt: skip
+
+
+def identify(
+    flights: Flights,
+    vehicle: str,
+    gear: str,
+    gear_set: str,
+    names: Sequence[str],
+    overrides: Mapping[str, float] | None = None,
+    sigmas: Mapping[str, float] | None = None,
+    held_out: Callable[[int, Flip], bool] | None = None,
+    seed: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Identification:
+    """Fit parameters of a vehicle to the motion of recorded flights.
+
+    Args:
+        flights: Recorded flights.
+        vehicle: Name or file of the vehicle to start from.
+        gear: Landing gear that was flown.
+        gear_set: Its set.
+        names: Parameters to fit, by dotted name.
+        overrides: Parameters to change and hold.
+        sigmas: Prior standard deviations in place of those of the file.
+        held_out: True for a flight (by number and flip) that is not fitted but judged.
+        seed: Of the resampling.
+        progress: Called with a line after each round.
+
+    Raises:
+        ConfigError: A name is unknown or cannot be fitted, a file is wrong, or no flight can be used.
+    """
+    held = dict(overrides or {})
+    priors = _priors(vehicle, names, held, sigmas or {})
+    found, left_out = compare.flips(flights)
+    judged = [held_out is not None and held_out(i, flip) for i, flip in enumerate(found)]
+    used = [flip for flip, out in zip(found, judged, strict=True) if not out]
+    apart = [flip for flip, out in zip(found, judged, strict=True) if out]
+    if not used:
+        raise ConfigError("no flight is left to fit: every one is held out")
+    problem = _Problem(vehicle, gear, gear_set, held, dict(zip(names, priors, strict=True)), used)
+    x, spread = problem.solve(progress)
+    at, blocks = problem.derivatives(x, spread)
+    values, resampled, covariance = problem.resample(x, at, blocks, np.random.default_rng(seed))
+    sigma = np.sqrt(np.diag(covariance))
+    estimates = tuple(
+        Estimate(name, native.library().params[name].unit, prior, float(v), float(s), (float(lo), float(hi)))
+        for name, prior, v, s, (lo, hi) in zip(names, priors, values, sigma, resampled, strict=True)
+    )
+    fitted = {**held, **{e.name: e.value for e in estimates}}
+    correlation = covariance / np.outer(sigma, sigma)
+    before, after = ({"fitted": problem.errors(used, o), "held_out": problem.errors(apart, o)} for o in (held, fitted))
+    words = _words(estimates, correlation, len(used))
+    labels = tuple(flip.label for flip in used), tuple(flip.label for flip in apart)
+    return Identification(estimates, correlation, *labels, spread, before, after, words, tuple(left_out))
+
+
+class _Problem:
+    """The fit: residuals of all flights as a function of x, the parameters in units of their prior's scale."""
+
+    def __init__(self, vehicle: str, gear: str, gear_set: str, held: dict[str, float], priors: dict[str, Prior],
+                 flips: list[Flip]) -> None:  # fmt: skip
+        self._made = (vehicle, gear, gear_set)
+        self._held, self._priors, self._flips = held, priors, flips
+        self._scale = np.array([prior.scale for prior in priors.values()])
+        self._center = np.array([prior.value for prior in priors.values()])
+
+    def values(self, x: FloatArray) -> FloatArray:
+        """Parameter values of x."""
+        return np.asarray(self._center + self._scale * x)
+
+    def overrides(self, x: FloatArray) -> dict[str, float]:
+        return {**self._held, **dict(zip(self._priors, map(float, self.values(x)), strict=True))}
+
+    def world(self, flip: Flip, overrides: dict[str, float]) -> World:
+        return motion.short_world(compare.world_of(flip, *self._made, overrides), {})
+
+    def errors(self, flips: Sequence[Flip], overrides: dict[str, float]) -> dict[str, Any] | None:
+        """Motion errors of flights; None without any."""
+        if not flips:
+            return None
+        rooms = _Rooms(self, overrides)
+        return compare.motion_errors([(flip, motion.fly(rooms.world(flip), flip)) for flip in flips])
+
+    def raw(self, x: FloatArray) -> list[dict[str, FloatArray]]:
+        """Residuals of each flight by kind, in their own units."""
+        rooms = _Rooms(self, self.overrides(x))
+        return [_residuals(rooms.world(flip), flip) for flip in self._flips]
+
+    def solve(self, progress: Callable[[str], None] | None) -> tuple[FloatArray, dict[str, float]]:
+        """Alternate between the fit and the spread of its residuals."""
+        spread = dict(_START_SPREAD)
+        x = np.zeros(len(self._priors))
+        lo, hi = self._bounds()
+        for number in range(_ROUNDS):
+            weights = dict(spread)
+            result = least_squares(
+                lambda x, w=weights: np.concatenate([*_weighted(self.raw(x), w), self.shared(x)]),
+                np.clip(x, lo + 1e-9, hi - 1e-9),
+                jac=lambda x, w=weights: np.concatenate([*self.derivatives(x, w)[1], self._shared_slope(x)]),
+                bounds=(lo, hi),
+                x_scale="jac",
+                loss="soft_l1",
+                max_nfev=_EVALUATIONS,
+            )
+            x = np.asarray(result.x)
+            spread = _spread(self.raw(x))
+            if progress:
+                named = ", ".join(f"{n} {v:.4g}" for n, v in zip(self._priors, self.values(x), strict=True))
+                progress(f"round {number + 1} of {_ROUNDS}: {named}; pitch {spread['pitch']:.1f} deg")
+        return x, spread
+
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        lo = np.array([p.lo for p in self._priors.values()])
+        hi = np.array([p.hi for p in self._priors.values()])
+        return (lo - self._center) / self._scale, (hi - self._center) / self._scale
+
+    def shared(self, x: FloatArray) -> FloatArray:
+        """What is not of a single flight, in standard deviations: distance from the prior, hanging height."""
+        known = np.array([np.isfinite(prior.sigma) for prior in self._priors.values()])
+        rooms = _Rooms(self, self.overrides(x))
+        hanging = [rooms.hanging_m(flip) - flip.hanging_m for flip in self._flips if np.isfinite(flip.hanging_m)]
+        height = [float(np.median(hanging)) / _HANGING_SIGMA_M] if hanging else []
+        return np.concatenate([np.where(known, x, 0.0), height])
+
+    def _shared_slope(self, x: FloatArray) -> FloatArray:
+        steps = _STEP * np.eye(len(x))
+        return np.stack([(self.shared(x + step) - self.shared(x - step)) / (2 * _STEP) for step in steps], axis=1)
+
+    def derivatives(self, x: FloatArray, spread: Mapping[str, float]) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Weighted residuals of each flight, and their derivatives, shape (n_residuals, n_parameters)."""
+        here = _weighted(self.raw(x), spread)
+        blocks = [np.zeros((len(r), len(x))) for r in here]
+        for i in range(len(x)):
+            step = np.zeros(len(x))
+            step[i] = _STEP
+            above, below = (_weighted(self.raw(x + sign * step), spread) for sign in (1.0, -1.0))
+            for block, a, b in zip(blocks, above, below, strict=True):
+                block[:, i] = np.clip((a - b) / (2.0 * step[i]), -50.0, 50.0)
+        return here, blocks
+
+    def resample(
+        self, x: FloatArray, at: list[FloatArray], blocks: list[FloatArray], rng: np.random.Generator
+    ) -> tuple[FloatArray, list[tuple[float, float]], FloatArray]:
+        """Values, 95 % intervals and covariance: flights drawn anew, what they share drawn about itself."""
+        # the weights of the fit's robust loss: a flight whose log slipped counts little here as well
+        weights = [1.0 / np.sqrt(1.0 + residual**2) for residual in at]
+        normal = [block.T @ (w[:, None] * block) for block, w in zip(blocks, weights, strict=True)]
+        slope = [block.T @ (w * residual) for block, w, residual in zip(blocks, weights, at, strict=True)]
+        shared, shared_slope = self.shared(x), self._shared_slope(x)
+        n = len(blocks)
+        drawn = []
+        for _ in range(_RESAMPLES):
+            count = rng.multinomial(n, np.full(n, 1.0 / n))
+            matrix = np.tensordot(count, normal, axes=1) + shared_slope.T @ shared_slope
+            right = np.tensordot(count, slope, axes=1)
+            right = right + shared_slope.T @ (shared + rng.normal(size=len(shared)))
+            drawn.append(x - np.linalg.lstsq(matrix, right, rcond=None)[0])
+        lo, hi = self._bounds()
+        spread = self.values(np.clip(np.array(drawn), lo, hi))
+        covariance = np.atleast_2d(np.cov(spread.T)) * n / max(n - 1, 1)
+        values = self.values(x)
+        reach = 1.96 * np.sqrt(np.diag(covariance))
+        return values, list(zip(values - reach, values + reach, strict=True)), covariance
+
+
+class _Rooms:
+    """Worlds of one set of parameters: one for each room, made once."""
+
+    def __init__(self, problem: _Problem, overrides: dict[str, float]) -> None:
+        self._problem, self._overrides = problem, overrides
+        self._worlds: dict[tuple[float, float], World] = {}
+        self._hanging: dict[tuple[float, float], float] = {}
+
+    def world(self, flip: Flip) -> World:
+        key = (flip.h_plane_m, flip.h_surface_m if np.isfinite(flip.h_surface_m) else -1.0)
+        if key not in self._worlds:
+            self._worlds[key] = self._problem.world(flip, self._overrides)
+        return self._worlds[key]
+
+    def hanging_m(self, flip: Flip) -> float:
+        """Height at which the vehicle hangs on four feet in the flight's room."""
+        world = self.world(flip)
+        values = world.params.values
+        down_m = -values["leg.hip_z"] + values["leg.length"] * float(np.cos(np.radians(values["leg.angle"])))
+        return values["world.ceiling_height"] - down_m - values["leg.foot_radius"]
+
+
+def _residuals(world: World, flip: Flip) -> dict[str, FloatArray]:
+    """Simulated minus recorded, by kind."""
+    simulated = motion.fly(world, flip)
+    used = flip.compared()
+    rate = motion.clip_rate(simulated.rate_radps)
+    parts = {
+        "pitch": (simulated.pitch_deg - flip.pitch_deg)[used],
+        "rate": (rate - motion.clip_rate(flip.rate_radps))[used],
+        "height": (simulated.height_m - flip.height_m)[used],
+    }
+    late = simulated.t_contact_s - flip.t_contact_s
+    near = np.isfinite(late) and abs(late) < _CONTACT_FAR_S
+    parts["contact"] = np.array([late]) if near else np.zeros(1)
+    return parts
+
+
+def _weighted(raw: Sequence[Mapping[str, FloatArray]], spread: Mapping[str, float]) -> list[FloatArray]:
+    """Residuals in units of their spread, so that the samples of a flight count as their independent looks."""
+    return [
+        np.concatenate([parts[k] / spread[k] * np.sqrt(min(_LOOKS[k] / max(len(parts[k]), 1), 1.0)) for k in KINDS])
+        for parts in raw
+    ]
+
+
+def _spread(raw: Sequence[Mapping[str, FloatArray]]) -> dict[str, float]:
+    """Spread of each kind, robust against single flights whose log slipped."""
+    result = {}
+    for kind in KINDS:
+        whole = np.concatenate([parts[kind] for parts in raw])
+        known = whole[whole != 0.0]
+        robust = float(np.median(np.abs(known)) / 0.6745) if len(known) else _START_SPREAD[kind]
+        result[kind] = max(robust, _LEAST_SPREAD[kind])
+    return result
+
+
+def _priors(vehicle: str, names: Sequence[str], held: Mapping[str, float], sigmas: Mapping[str, float]) -> list[Prior]:
+    table = native.library().params
+    quantities = model.load_vehicle(vehicle).quantities
+    priors = []
+    for name in names:
+        field = table.get(name)
+        if field is None or name.partition(".")[0] not in _FITTED_GROUPS:
+            allowed = sorted(n for n in quantities if n.partition(".")[0] in _FITTED_GROUPS)
+            known = "of the landing gear, not of the vehicle" if field is not None else "unknown"
+            raise ConfigError(f"--fit: {name}: {known} (of {vehicle}: {', '.join(allowed)})")
+        if name in held:
+            raise ConfigError(f"--fit: {name}: is also given by --set")
+        quantity = quantities.get(name)
+        value = quantity.value if quantity else field.default
+        if value is None:
+            raise ConfigError(f"--fit: {name}: the vehicle {vehicle} does not give it")
+        sigma = sigmas.get(name, quantity.sigma if quantity and quantity.sigma else float("inf"))
+        if not sigma > 0.0:
+            raise ConfigError(f"--sigma: {name}: value {sigma!r} (allowed: above 0)")
+        priors.append(Prior(value, sigma, field.lo, min(field.hi, 1e6)))
+    if len(set(names)) != len(names):
+        raise ConfigError("--fit: a parameter is named twice")
+    return priors
+
+
+def _words(estimates: Sequence[Estimate], correlation: FloatArray, n: int) -> tuple[str, ...]:
+    """What the flights cannot tell."""
+    words = []
+    for i, one in enumerate(estimates):
+        if np.isfinite(one.prior.sigma) and one.sigma > _SILENT * one.prior.sigma:
+            words.append(f"The flights say little of {one.name}: its spread is that of the vehicle file.")
+        for j in range(i):
+            if abs(correlation[i, j]) > _ALIKE:
+                words.append(
+                    f"The flights do not separate {estimates[j].name} from {one.name} (correlation "
+                    f"{correlation[i, j]:.2f}): only their combination is known. Measure one of them otherwise."
+                )
+        at_bound = min(abs(one.value - one.prior.lo), abs(one.value - one.prior.hi))
+        if at_bound < 1e-6 * max(abs(one.value), 1e-9):
+            words.append(f"{one.name} ended at the end of its allowed range: the model does not explain the flights.")
+    if n < 5:
+        words.append(f"{n} flights are few: the intervals are rough.")
+    return tuple(words)
+
+
+def vehicle_file(vehicle: str, result: Identification, source: str) -> dict[str, Any]:
+    """The vehicle with the fitted numbers, as the content of a vehicle file.
+
+    Args:
+        vehicle: Name or file that was started from.
+        result: Of `identify`.
+        source: What the numbers come from, in a few words.
+    """
+    part = model.load_vehicle(vehicle)
+    fitted = {estimate.name: estimate for estimate in result.estimates}
+    groups: dict[str, dict[str, Any]] = {}
+    quantities = {name: replace_quantity(q, fitted.get(name), source) for name, q in part.quantities.items()}
+    for name, estimate in fitted.items():
+        if name not in quantities:
+            quantities[name] = _quantity(estimate, source)
+    for name, quantity in quantities.items():
+        group, _, key = name.partition(".")
+        groups.setdefault(group, {})[key] = quantity
+    doc = f"{part.doc} Identified from {len(result.used)} recorded flights: {', '.join(fitted)}."
+    return {"name": f"{part.name}_identified", "doc": doc, **groups}
+
+
+def replace_quantity(quantity: model.Quantity, estimate: Estimate | None, source: str) -> dict[str, Any]:
+    """A quantity as it stands in a vehicle file, fitted or as it was."""
+    if estimate is not None:
+        return _quantity(estimate, source)
+    kept: dict[str, Any] = {"value": quantity.value, "unit": quantity.unit}
+    if quantity.sigma is not None:
+        kept["sigma"] = quantity.sigma
+    return {**kept, "source": quantity.source}
+
+
+def _quantity(estimate: Estimate, source: str) -> dict[str, Any]:
+    return {"value": estimate.value, "unit": estimate.unit, "sigma": estimate.sigma, "source": source}
