@@ -8,7 +8,7 @@ PYTHON     ?= python3
 CLANG      ?= clang-14
 FLAVOUR    ?= release
 JOBS       ?= $(shell getconf _NPROCESSORS_ONLN)
-EXPERIMENT ?= experiments/paper_vertical.yaml
+EXPERIMENT ?= experiments/paper_flight.yaml
 SWEEP      ?= sweeps/smoke.yaml
 FUZZ_RUNS  ?= 5000000
 ifeq ($(origin CC),default)
@@ -54,7 +54,7 @@ sil: setup build ## start the software vehicle on udp://127.0.0.1:19850, with th
 	@$(BIN)/ivl sil $(if $(VEHICLE)$(GEAR),$(if $(VEHICLE),--vehicle $(VEHICLE)) $(if $(GEAR),--gear $(GEAR)),--experiment $(EXPERIMENT)) $(SIL_ARGS)
 
 .PHONY: learn
-learn: setup build ## learn the paper's vertical landing (EXPERIMENT=... for another)
+learn: setup build ## learn the paper's landing on the vehicle that agrees with real flights (EXPERIMENT=... for another)
 	$(say) 'learn: $(EXPERIMENT)'
 	@$(BIN)/ivl learn $(EXPERIMENT)
 

@@ -99,6 +99,23 @@ class Check(Strict):
     moment_y_Nmm: GridAxis = GridAxis(lo=1.0, hi=11.0, step=0.5)
 
 
+class Flown(Strict):
+    """Policies that landed on a real vehicle: drawn beside what is learned, known to no learner."""
+
+    label: str = Field(min_length=1)
+    rrev_c_per_s: Bounds
+    moment_y_Nmm: Bounds
+    source: str = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for name in POLICY:
+            lo, hi = getattr(self, name)
+            if not lo <= hi:
+                raise ValueError(f"{name}: {lo} must not be above {hi}")
+        return self
+
+
 class Experiment(Strict):
     """A complete, checked experiment; `to_yaml` gives the text from which the same object is read."""
 
@@ -122,6 +139,7 @@ class Experiment(Strict):
     budget: int = Field(default=160, ge=1, le=1_000_000)
     reward: RewardChoice = RewardChoice()
     check: Check = Check()
+    flown: list[Flown] = Field(default_factory=list, description="real flights to draw beside the learning")
     seed: int = Field(default=0, ge=0, lt=2**63)
 
     @model_validator(mode="after")

@@ -24,7 +24,7 @@ CLASSES = (4, 2, 0)
 """Endings: three or four feet, one or two, none."""
 _WINDOW_RATE = 0.5
 _WINDOW_ROLLOUTS, _WINDOW_STEP_PER_S, _WINDOW_MARGIN_PER_S = 64, 0.05, 0.6
-_GROUP_NMM, _GROUP_FLIGHTS = 0.3, 3
+GROUP_NMM, _GROUP_FLIGHTS = 0.3, 3
 _BOOTSTRAPS = 2000
 _BANDS = (10.0, 50.0, 90.0)
 
@@ -301,7 +301,7 @@ def _groups(found: Sequence[Flip]) -> list[tuple[float, list[Flip]]]:
     left = sorted(found, key=lambda flip: flip.moment_y_Nmm)
     groups: list[list[Flip]] = []
     for flip in left:
-        if groups and flip.moment_y_Nmm - groups[-1][0].moment_y_Nmm <= _GROUP_NMM:
+        if groups and flip.moment_y_Nmm - groups[-1][0].moment_y_Nmm <= GROUP_NMM:
             groups[-1].append(flip)
         else:
             groups.append([flip])

@@ -15,6 +15,7 @@ from ivl.plots import style
 from ivl.store import SCORED, EpisodeRow, RolloutRows
 
 LABELS = {"rrev_c_per_s": "RREV$_c$ (1/s)", "moment_y_Nmm": "$M_{yd}$ (N mm)"}
+_FLOWN_COLOURS = (style.PURPLE, style.DIM)
 OUTCOMES = (
     ("four legs, clean", style.GREEN, "o"),
     ("four legs, body contact", style.SKY, "s"),
@@ -51,6 +52,7 @@ def draw(
     axes = figure.subplots(3, 1, sharex=True, height_ratios=(3, 3, 2))
     for i, name in enumerate(POLICY):
         _draw_parameter(axes[i], experiment, history, rollouts, i)
+        _draw_flown(axes[i], experiment, name)
         axes[i].set_ylabel(LABELS[name])
     _draw_rate(axes[2], experiment, history)
     axes[2].set_xlabel("rollout")
@@ -91,6 +93,16 @@ def _draw_parameter(
             number[chosen], rollouts.theta[chosen, i], s=12, color=color, marker=marker, linewidths=1, label=label
         )
     axis.set_ylim(*_limits(parameter.bounds, rollouts.theta[:, i]))
+
+
+def _draw_flown(axis: Axes, experiment: Experiment, name: str) -> None:
+    """Where real flights landed: a band, or a line where they flew one policy."""
+    for flown, colour in zip(experiment.flown, _FLOWN_COLOURS * len(experiment.flown), strict=False):
+        lo, hi = getattr(flown, name)
+        if hi > lo:
+            axis.axhspan(lo, hi, color=colour, alpha=0.3, linewidth=0, label=flown.label)
+        else:
+            axis.axhline(lo, color=colour, linewidth=1.2, linestyle="--", label=flown.label)
 
 
 def _draw_rate(axis: Axes, experiment: Experiment, history: Sequence[EpisodeRow]) -> None:
