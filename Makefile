@@ -121,7 +121,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 # longest first; some mostly compute, some mostly wait; test-wire flies in real time and has the machine for itself
-SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-report test-analysis test-physics sizes-diff
+SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-report test-analysis test-flight test-physics sizes-diff
 
 .PHONY: test
 test: setup-dev toolchain cross-toolchain chromium qt-libraries lint test-c san golden ## everything below, set-up and compilers included
@@ -193,6 +193,11 @@ reliability: setup-dev build ## learn over links that lose, delay, freeze and re
 test-wire: setup-dev build ## CRTP over a CAN bus, and motion capture
 	$(say) 'test-wire: pytest tests/wire'
 	@$(BIN)/python -m pytest tests/wire $(PYTEST_ARGS)
+
+.PHONY: test-flight
+test-flight: setup-dev build ## recorded flights
+	$(say) 'test-flight: pytest tests/flight'
+	@$(BIN)/python -m pytest tests/flight $(PYTEST_ARGS)
 
 .PHONY: test-physics
 test-physics: setup-dev build ## landings with known properties, and a sample of the step-size study

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "sim_replay.h"
 #include "sim_rollout.h"
 
 enum
@@ -61,6 +62,14 @@ typedef struct
     {#name, "f8", (uint32_t)offsetof(derived_t, name), 1, unit, 0.0, IVL_SIM_UNLIMITED, IVL_SIM_REQUIRED, doc},
 static const ivl_sil_field_t DERIVED_FIELDS[] = {DERIVED(DERIVED_ROW)};
 
+// a recorded flight: any number may have been recorded
+#define REPLAY_IN_ROW(name, member, count, np, unit, doc)                                                                                  \
+    {#name, np, (uint32_t)offsetof(ivl_in_t, member), count, unit, -IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, 0.0, doc},
+#define REPLAY_OUT_ROW(c_type, name, np, unit, expression, doc)                                                                            \
+    {#name, np, (uint32_t)offsetof(ivl_sim_replay_row_t, name), 1, unit, -IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, IVL_SIM_REQUIRED, doc},
+static const ivl_sil_field_t REPLAY_IN_FIELDS[] = {IVL_SIM_REPLAY_INPUTS(REPLAY_IN_ROW)};
+static const ivl_sil_field_t REPLAY_OUT_FIELDS[] = {IVL_SIM_REPLAY_ROWS(REPLAY_OUT_ROW)};
+
 typedef struct
 {
     const ivl_sil_field_t *fields;
@@ -68,9 +77,13 @@ typedef struct
 } table_t;
 
 #define TABLE(array, type) {array, (uint32_t)(sizeof array / sizeof array[0]), (uint32_t)sizeof(type)}
-static const table_t TABLES[] = {TABLE(PARAM_FIELDS, params_t), TABLE(SPEC_FIELDS, ivl_sim_spec_t),
-                                 TABLE(OUTCOME_FIELDS, ivl_sim_outcome_t), TABLE(TRACE_FIELDS, ivl_sim_trace_t),
-                                 TABLE(DERIVED_FIELDS, derived_t)};
+static const table_t TABLES[] = {TABLE(PARAM_FIELDS, params_t),
+                                 TABLE(SPEC_FIELDS, ivl_sim_spec_t),
+                                 TABLE(OUTCOME_FIELDS, ivl_sim_outcome_t),
+                                 TABLE(TRACE_FIELDS, ivl_sim_trace_t),
+                                 TABLE(DERIVED_FIELDS, derived_t),
+                                 TABLE(REPLAY_IN_FIELDS, ivl_in_t),
+                                 TABLE(REPLAY_OUT_FIELDS, ivl_sim_replay_row_t)};
 _Static_assert(sizeof TABLES / sizeof TABLES[0] == IVL_SIL_TABLE_COUNT, "one table each");
 
 int ivl_sil_abi_version(void)
@@ -234,6 +247,12 @@ long ivl_sil_trace(const void *model, const void *spec, double period_s, void *r
     single_t         single = {{spec, outcome, &tracer}, false};
     ivl_sim_fly(model, next_of_single, &single);
     return (long)tracer.n;
+}
+
+int ivl_sil_replay(const void *model, const void *config, float rrev_c_per_s, float moment_y_Nm, const void *inputs, size_t n, void *rows)
+{
+    const ivl_policy_t policy = {.seq = 1, .rrev_c_per_s = rrev_c_per_s, .moment_y_Nm = moment_y_Nm};
+    return (int)ivl_sim_replay(model, config, &policy, inputs, n, rows);
 }
 
 const char *ivl_sil_end_reason(int code)

@@ -24,11 +24,13 @@ typedef struct
 
 typedef enum
 {
-    IVL_SIL_TABLE_PARAM,    ///< input of ivl_sil_model_create: doubles
-    IVL_SIL_TABLE_SPEC,     ///< input of a rollout
-    IVL_SIL_TABLE_OUTCOME,  ///< result of a rollout
-    IVL_SIL_TABLE_TRACE,    ///< one row of a time series
-    IVL_SIL_TABLE_DERIVED,  ///< what follows from the parameters
+    IVL_SIL_TABLE_PARAM,       ///< input of ivl_sil_model_create: doubles
+    IVL_SIL_TABLE_SPEC,        ///< input of a rollout
+    IVL_SIL_TABLE_OUTCOME,     ///< result of a rollout
+    IVL_SIL_TABLE_TRACE,       ///< one row of a time series
+    IVL_SIL_TABLE_DERIVED,     ///< what follows from the parameters
+    IVL_SIL_TABLE_REPLAY_IN,   ///< what the flight core is told in one tick of a replay
+    IVL_SIL_TABLE_REPLAY_OUT,  ///< what it answers
     IVL_SIL_TABLE_COUNT
 } ivl_sil_table_t;
 
@@ -55,6 +57,11 @@ int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threa
 /// One landing with its time series; rows beyond the capacity are counted, not written.
 /// @return rows that the landing has; -1 if the period is not positive
 long ivl_sil_trace(const void *model, const void *spec, double period_s, void *rows, size_t capacity, void *outcome);
+
+/// A flight core of this configuration (layout IVL_SIL_LAYOUT_CONFIG) and policy steps through n recorded inputs, where the model's core runs.
+/// @param[out] rows  n rows of IVL_SIL_TABLE_REPLAY_OUT
+/// @return 0; 1 if the core refuses the configuration, 2 if it refuses the policy
+int ivl_sil_replay(const void *model, const void *config, float rrev_c_per_s, float moment_y_Nm, const void *inputs, size_t n, void *rows);
 
 const char *ivl_sil_end_reason(int code);
 const char *ivl_sil_phase_name(int code);

@@ -1,8 +1,13 @@
 """For all tests."""
 
 import signal
+import sys
+from pathlib import Path
 
 from hypothesis import HealthCheck, settings
+
+# Flights with known answers are replayed by the tests of flights and by those on the emulated chip.
+sys.path[:0] = [str(Path(__file__).parent / "flight")]
 
 # Who starts the tests in the background may have told them to ignore Ctrl-C; programs under test would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -23,10 +23,11 @@ ABI_VERSION = 1
 LIBRARY_ENV = "IVL_NATIVE_LIBRARY"  # another build of the library, for example one with sanitizers
 DEFAULT_LIBRARY = Path(__file__).parent / "_native" / "libivl_sil.so"
 
-TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED = range(5)
+TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED, TABLE_REPLAY_IN, TABLE_REPLAY_OUT = range(7)
 LAYOUT_RECORD_HEADER, LAYOUT_RECORD_ROW, LAYOUT_CONFIG, LAYOUT_LOGS = range(0x100, 0x104)
 _ERROR_BYTES = 256
 _TRACE_ROWS = 1024  # first guess; the call says when it needs more
+_REFUSED = ("", "configuration", "policy")  # ivl_sim_replay_status_t
 _FIELD_TYPES = {"f8": 8, "f4": 4, "i4": 4, "u4": 4, "u8": 8, "i8": 8, "i2": 2, "u2": 2, "i1": 1, "u1": 1}
 
 
@@ -98,6 +99,8 @@ class NativeLibrary:
         self.outcome_fields, self.outcome_dtype = self._table(TABLE_OUTCOME)
         self.trace_fields, self.trace_dtype = self._table(TABLE_TRACE)
         self.derived_fields, self.derived_dtype = self._table(TABLE_DERIVED)
+        self.replay_in_fields, self.replay_in_dtype = self._table(TABLE_REPLAY_IN)
+        self.replay_out_fields, self.replay_out_dtype = self._table(TABLE_REPLAY_OUT)
 
     def _fields(self, table: int, call: str = "ivl_sil_table") -> tuple[tuple[Field, ...], int]:
         n_fields, item_size = ctypes.c_uint32(), ctypes.c_uint32()
@@ -192,6 +195,25 @@ class NativeModel:
         crc = self._library._c.ivl_sil_model_config(self._handle, _pointer(record))
         return record, int(crc)
 
+    def replay(
+        self, config: npt.NDArray[np.void], policy: tuple[float, float], inputs: npt.NDArray[np.void]
+    ) -> tuple[npt.NDArray[np.void], str]:
+        """Step a fresh flight core through recorded inputs, where this model's core runs.
+
+        Args:
+            config: Configuration, one record as `config()` gives it.
+            policy: RREV_c in 1/s and M_yd in N m.
+            inputs: One record of `replay_in_dtype` a tick.
+
+        Returns:
+            One record of `replay_out_dtype` a tick, and "" or what the core refused: "configuration" or "policy".
+        """
+        inputs = np.ascontiguousarray(inputs)
+        rows = np.zeros(inputs.shape, dtype=self._library.replay_out_dtype)
+        call = self._library._c.ivl_sil_replay
+        status = int(call(self._handle, _pointer(config), *policy, _pointer(inputs), inputs.size, _pointer(rows)))
+        return rows, _REFUSED[status]
+
     def rollouts(self, specs: npt.NDArray[np.void], n_threads: int) -> npt.NDArray[np.void]:
         """Fly `specs` (1-D, `spec_dtype`); returns the outcomes in the same order, same bits for any `n_threads`."""
         outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
@@ -240,6 +262,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_model_derived", None, (ptr, ptr)),
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
+        ("ivl_sil_replay", c_int, (ptr, ptr, ctypes.c_float, ctypes.c_float, ptr, size, ptr)),
         ("ivl_sil_end_reason", ctypes.c_char_p, (c_int,)),
         ("ivl_sil_rule_name", ctypes.c_char_p, (c_int,)),
         ("ivl_sil_layout", ctypes.POINTER(_CField), (c_int, u32p, u32p)),

@@ -38,6 +38,8 @@ def test_tables_describe_fields_that_do_not_overlap_and_have_a_unit_and_a_doc() 
         (library.outcome_fields, library.outcome_dtype),
         (library.trace_fields, library.trace_dtype),
         (library.derived_fields, library.derived_dtype),
+        (library.replay_in_fields, library.replay_in_dtype),
+        (library.replay_out_fields, library.replay_out_dtype),
     ):
         end = 0
         for field in sorted(fields.values(), key=lambda f: f.offset):

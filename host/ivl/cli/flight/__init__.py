@@ -2,7 +2,7 @@
 
 import typer
 
-from ivl.cli.flight import compare, identify, import_, show
+from ivl.cli.flight import compare, identify, import_, replay, show
 
 HELP = """Work with recorded flights: import a log, replay it, compare it with the simulation, identify the vehicle.
 
@@ -21,5 +21,6 @@ Examples:
 app = typer.Typer(help=HELP, rich_markup_mode=None, no_args_is_help=True)
 app.command("import", help=import_.HELP, short_help="Turn logs of other programs into flights.")(import_.import_)
 app.command("show", help=show.HELP, short_help="Show what a folder of flights holds.")(show.show)
+app.command("replay", help=replay.HELP, short_help="Feed recorded states to the flight core.")(replay.replay)
 app.command("compare", help=compare.HELP, short_help="Hold flights against the simulation.")(compare.compare)
 app.command("identify", help=identify.HELP, short_help="Fit a vehicle to recorded motion.")(identify.identify)
