@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ivl.flight import streams
-from ivl.flight.log import Given, fresh_only, frozen_from
+from ivl.flight.log import Given, frozen_from
 from ivl.flight.phases import plane, trigger
 from ivl.flight.store import Flight, FloatArray, make_flight
 from ivl.flight.streams import Merged, Stream
@@ -166,7 +166,6 @@ def _flight(merged: Merged, rows: Any) -> Flight:
     t_s = merged.t_s[rows]
     columns = {name: values[rows] for name, values in merged.columns.items()}
     facts = {name: columns.pop(name) for name in _FACTS if name in columns}
-    fresh_only(columns)
     first = _trigger(columns, facts)
     info: dict[str, Any] = {"label": merged.sources[rows[0]].stem, "source": merged.sources[rows[0]].name}
     if first is not None:

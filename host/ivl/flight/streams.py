@@ -1,6 +1,7 @@
 """Several streams of samples on one clock, each with its own rate, become one table of samples, cut into flights.
 
-The rows are those of the fastest stream with a part of the vehicle's pose; the others hold their last value.
+The rows are those of the fastest stream with a part of the vehicle's pose. What moves is interpolated on them;
+commands, phases and what the vehicle computed hold their last value.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,12 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from ivl.errors import ConfigError
-from ivl.flight.log import GAP_S, Given
+from ivl.flight.log import GAP_S, Given, fresh_only
 from ivl.flight.phases import APPROACH, READY
 from ivl.flight.schema import POSE
 from ivl.flight.store import FloatArray
 from ivl.flight.table import IntArray, Rule, Table, samples, shorten
 
+_SMOOTH = ("p_", "v_", "q_", "w_", "f_", "track_", "rotor_", "battery_")
+_STATE_S, _TRACK_S, _PERIODS = 0.25, 0.05, 3
+"""Neighbours further apart than this, and than so many usual periods, are not interpolated between."""
 N_SAMPLES_MIN = 10
 """A piece with fewer samples is no flight."""
 
@@ -102,7 +106,9 @@ def make(name: str, table: Table, t_s: FloatArray, groups: Sequence[Sequence[Rul
             if there and not taken and (len(there) == len(group) or parts):
                 chosen = {rule.target: rule for rule in there} | chosen
     variables = [*table.columns, *(f"{name}:{column}" for column in table.columns)]
-    return Stream(table.path, name, t_s, samples(table, list(chosen.values())), frozenset(variables))
+    columns = samples(table, list(chosen.values()))
+    fresh_only(columns)
+    return Stream(table.path, name, t_s, columns, frozenset(variables))
 
 
 def known(found: Sequence[Stream], given: Given, where: str) -> list[Stream]:
@@ -136,7 +142,7 @@ def recordings(streams: Sequence[Stream]) -> list[list[Stream]]:
 
 
 def merge(streams: Sequence[Stream]) -> Merged:
-    """Streams of one recording on common rows; a value is held for at most `GAP_S`."""
+    """Streams of one recording on common rows."""
     parts = {name: _providers(streams, name) for stream in streams for name in stream.columns}
     candidates = [name for name in parts if name in POSE] or list(parts)
     base = parts[max(candidates, key=lambda name: sum(len(s.t_s) for s in parts[name]))]
@@ -144,11 +150,56 @@ def merge(streams: Sequence[Stream]) -> Merged:
     columns = {}
     for name, members in parts.items():
         t_own_s = np.concatenate([s.t_s for s in members])
-        columns[name] = _held(t_s, t_own_s, np.concatenate([s.columns[name] for s in members]))
+        values = np.concatenate([_continuous(s, name) for s in members])
+        if members == base:
+            columns[name] = np.concatenate([s.columns[name] for s in base])
+        elif name.startswith(_SMOOTH):
+            columns[name] = _between(t_s, t_own_s, values, _TRACK_S if name.startswith("track_") else _STATE_S)
+        else:
+            columns[name] = _held(t_s, t_own_s, values)
+    for stem in ("q", "track_q"):
+        _normalise(columns, [f"{stem}_{axis}" for axis in "xyzw"])
     sources = [s.source for s in base for _ in range(len(s.t_s))]
+    return Merged(t_s, columns, sources, _words(streams, base))
+
+
+def _words(streams: Sequence[Stream], base: Sequence[Stream]) -> str:
     rates = ", ".join(f"{s.name} every {1000 * s.period_s():.3g} ms" for s in streams)
-    held = f"; the rows are those of {base[0].name}, the others hold their last value" if len(streams) > 1 else ""
-    return Merged(t_s, columns, sources, rates + held)
+    if len(streams) == len(base):
+        return rates
+    return f"{rates}; the rows are those of {base[0].name}; of the others, motion is interpolated and the rest held"
+
+
+def _continuous(stream: Stream, name: str) -> FloatArray:
+    """A column; one of a quaternion without changes of sign, so that it can be interpolated."""
+    stem, axis = name[:-1], name[-1]
+    if stem not in ("q_", "track_q_") or any(f"{stem}{a}" not in stream.columns for a in "xyzw"):
+        return stream.columns[name]
+    q = np.stack([stream.columns[f"{stem}{a}"] for a in "xyzw"], axis=1)
+    known = np.flatnonzero(np.isfinite(q).all(axis=1))
+    turns = np.where((q[known][1:] * q[known][:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    sign = np.ones(len(q))
+    sign[known] = np.concatenate([[1.0], np.cumprod(turns)])[: len(known)]
+    return q[:, "xyzw".index(axis)] * sign
+
+
+def _normalise(columns: dict[str, FloatArray], names: Sequence[str]) -> None:
+    if all(name in columns for name in names):
+        norm = np.sqrt(sum(columns[name] ** 2 for name in names))
+        for name in names:
+            columns[name] = columns[name] / np.where(norm > 0, norm, np.nan)
+
+
+def _between(t_s: FloatArray, t_own_s: FloatArray, values: FloatArray, gap_s: float) -> FloatArray:
+    """Values between their neighbours in time; NaN outside, and where the neighbours are too far apart."""
+    known = np.isfinite(values)
+    t_own_s, values = t_own_s[known], values[known]
+    if len(values) < 2:
+        return np.full(len(t_s), np.nan)
+    after = np.clip(np.searchsorted(t_own_s, t_s), 1, len(t_own_s) - 1)
+    gap_s = max(gap_s, _PERIODS * float(np.median(np.diff(t_own_s))))
+    near = (t_own_s[after] - t_own_s[after - 1] <= gap_s) & (t_s >= t_own_s[0]) & (t_s <= t_own_s[-1])
+    return np.where(near, np.interp(t_s, t_own_s, values), np.nan)
 
 
 def _providers(streams: Sequence[Stream], name: str) -> list[Stream]:

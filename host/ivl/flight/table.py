@@ -90,7 +90,7 @@ class Table:
 
     def fault(self, row: int, column: str, what: str) -> ConfigError:
         """The error for one cell."""
-        return ConfigError(f"{self.path}: {self.place} {self.places[row]}: {column}: {what}")
+        return ConfigError(f"{self.path}: {self.place} {self.places[row]}: {shorten(column)}: {what}")
 
     def take(self, rows: IntArray | slice) -> "Table":
         """Some of the rows."""
@@ -101,8 +101,12 @@ class Table:
         }
         return Table(self.path, columns, self.places[index], self.place)
 
-    def need(self, names: Sequence[str], format_name: str) -> None:
+    def need(self, names: Sequence[str], what: str) -> None:
         """Refuse a table that lacks a column.
+
+        Args:
+            names: Columns that must be there.
+            what: What they are needed for.
 
         Raises:
             ConfigError: A column is missing; the message tells what is there.
@@ -110,9 +114,7 @@ class Table:
         for name in names:
             if name not in self.columns:
                 found = shorten(", ".join(self.columns), 100)
-                raise ConfigError(
-                    f"{self.path}: column {name} is missing in a log of format {format_name}: has {found}"
-                )
+                raise ConfigError(f"{self.path}: column {name} is missing for {what}; there are {found}")
 
     def text(self, name: str) -> list[str]:
         """A column as text."""
@@ -133,7 +135,7 @@ class Table:
         bad = np.isinf(numbers) | (np.isnan(numbers) & needed)
         if bad.any():
             row = int(np.argmax(bad))
-            cell = str(values[row]).strip()
+            cell = shorten(str(values[row]).strip())
             raise self.fault(row, name, f"value {cell} where a number must be" if cell else "is empty")
         return numbers
 
@@ -145,12 +147,13 @@ class Table:
             numbers = None
         if numbers is None or any("_" in cell for cell in filled):
             row = next(i for i, cell in enumerate(filled) if not _is_number(cell))
-            raise self.fault(row, name, f"value {shorten(cells[row])!r} is no number")
+            raise self.fault(row, name, f"value '{shorten(cells[row])}' is no number")
         return numbers
 
 
 def shorten(text: str, n: int = _SHOWN) -> str:
-    """Text of a message, cut off where it is long."""
+    """Text of a message: in one line, cut off where it is long."""
+    text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
     return text if len(text) <= n else text[: n - 3] + "..."
 
 
@@ -217,7 +220,7 @@ def header_of(path: Path, row: tuple[int, list[str]]) -> list[str]:
         if not name:
             raise ConfigError(f"{path}: line {line}: column {i + 1} has no name")
         if name in names[:i]:
-            raise ConfigError(f"{path}: line {line}: column {name} is there twice")
+            raise ConfigError(f"{path}: line {line}: column {shorten(name)} is there twice")
     return names
 
 
@@ -324,7 +327,9 @@ def _limit(table: Table, values: FloatArray, unit: str, name: str) -> None:
     huge = np.abs(values) > LIMITS[unit]
     if huge.any():
         row = int(np.argmax(huge))
-        raise table.fault(row, name, f"value {table.columns[name][row]} is beyond {LIMITS[unit]:g} {unit}")
+        raise table.fault(
+            row, name, f"value {shorten(str(table.columns[name][row]))} is beyond {LIMITS[unit]:g} {unit}"
+        )
 
 
 def _normalise(table: Table, columns: dict[str, FloatArray], names: Sequence[str], variable: str) -> None:

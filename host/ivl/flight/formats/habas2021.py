@@ -124,7 +124,7 @@ def _tables(path: Path) -> tuple[list[Table], list[tuple[int, int]]]:
     if not rows:
         raise ConfigError(f"{path}: is empty")
     names = border.header_of(path, rows[0])
-    Table(path, dict.fromkeys(names, ()), np.zeros(0, dtype=np.intp)).need(_NEEDED, "habas2021")
+    Table(path, dict.fromkeys(names, ()), np.zeros(0, dtype=np.intp)).need(_NEEDED, "format habas2021")
     where = names.index("policy")
     parts: list[list[tuple[int, list[str]]]] = [[], [], []]
     order = []
@@ -134,7 +134,9 @@ def _tables(path: Path) -> tuple[list[Table], list[tuple[int, int]]]:
         kind = 2 if "Flip Data" in row else int(len(row) == len(names) and row[where] != "")
         order.append((kind, len(parts[kind])))
         parts[kind].append((line, row))
-    return [border.make_table(path, names, part) for part in parts], order
+    tables = [border.make_table(path, names, parts[0])]
+    tables += [border.make_table(path, names, part) if part else tables[0].take(slice(0)) for part in parts[1:]]
+    return tables, order
 
 
 def _is_note(row: list[str]) -> bool:
@@ -143,7 +145,7 @@ def _is_note(row: list[str]) -> bool:
 
 def _attempts(samples: Table, others: list[Table], order: list[tuple[int, int]], t_s: FloatArray) -> list[_Attempt]:
     """Attempts in the order flown: one ends with its summary, with another rollout, or with a jump of the clock."""
-    keys = [list(zip(t.text("k_ep"), t.text("k_run"), strict=True)) for t in (samples, *others)]
+    keys = [_keys(table) for table in (samples, *others)]
     pieces: list[tuple[tuple[str, str], list[int], int | None, int | None]] = []
     is_open = False
     for kind, i in order:
@@ -164,6 +166,15 @@ def _attempts(samples: Table, others: list[Table], order: list[tuple[int, int]],
         number = 1 + sum(before == key for before, *_ in pieces[:n])
         result.append(_Attempt(key, number, last[key] == n, np.array(rows, dtype=np.intp), summary, snapshot))
     return [attempt for attempt in result if len(attempt.rows)]
+
+
+def _keys(table: Table) -> list[tuple[str, str]]:
+    """k_ep and k_run of each row."""
+    for name in ("k_ep", "k_run"):
+        for row, cell in enumerate(table.text(name)):
+            if not (cell.isascii() and cell.isdigit()):
+                raise table.fault(row, name, f"value '{border.shorten(cell)}' is no whole number")
+    return list(zip(table.text("k_ep"), table.text("k_run"), strict=True))
 
 
 def _plane(samples: Table) -> float:
@@ -227,7 +238,7 @@ def _triggered(part: Table, columns: dict[str, FloatArray]) -> tuple[npt.NDArray
     flags = part.text("flip_flag")
     for row, flag in enumerate(flags):
         if flag not in ("True", "False"):
-            raise part.fault(row, "flip_flag", f"value {border.shorten(flag)!r} is neither True nor False")
+            raise part.fault(row, "flip_flag", f"value '{border.shorten(flag)}' is neither True nor False")
     triggered = np.logical_or.accumulate(np.array([flag == "True" for flag in flags]))
     if triggered.any() or not {"thrust_cmd_N", "moment_cmd_y_Nm"} <= set(columns):
         return triggered, False
@@ -257,7 +268,8 @@ def _summary(summaries: Table, row: int, notes: list[str]) -> dict[str, Any]:
     one = summaries.take(np.array([row]))
     policy = _numbers(one, "policy")
     if len(policy) < 2:
-        raise one.fault(0, "policy", f"value {one.text('policy')[0]!r}: expected [RREV_c M_yd]")
+        text = border.shorten(one.text("policy")[0])
+        raise one.fault(0, "policy", f"value '{text}': expected [RREV_c M_yd]")
     info: dict[str, Any] = {"rrev_c_per_s": policy[0], "moment_y_Nmm": policy[1]}
     v_mps = [float(one.numbers(name)[0]) for name in ("vx", "vy", "vz")]
     if np.isfinite(v_mps).all():
@@ -281,7 +293,7 @@ def _numbers(one: Table, name: str) -> list[float]:
     try:
         return [float(word) for word in text.strip("[]").split()]
     except ValueError as error:
-        raise one.fault(0, name, f"value {border.shorten(text)!r} is no list of numbers") from error
+        raise one.fault(0, name, f"value '{border.shorten(text)}' is no list of numbers") from error
 
 
 def _judge(flight: Flight, notes: list[str]) -> Flight:

@@ -99,7 +99,9 @@ def _kinds(path: Path, body: bytes, n_kinds: int, time_type: str) -> tuple[dict[
             variable, at = _text(path, body, at)
             stem, letter = variable[:-3], variable[-2:-1]
             if variable[-3:] != f"({letter})" or letter not in _TYPES or not stem or stem in dict(fields):
-                raise ConfigError(f"{path}: byte {at}: {border.shorten(variable)!r} is no variable of event {name}")
+                raise ConfigError(
+                    f"{path}: byte {at}: '{border.shorten(variable)}' is no variable of event {border.shorten(name)}"
+                )
             fields.append((stem, _TYPES[letter]))
         if number in kinds:
             raise ConfigError(f"{path}: byte {at}: event {number} is there twice")
