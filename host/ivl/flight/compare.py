@@ -298,16 +298,17 @@ def _predict(
 
 def _groups(found: Sequence[Flip]) -> list[tuple[float, list[Flip]]]:
     """Flights of nearly the same moment, largest group first; groups of a few flights only are left out."""
-    left = sorted(found, key=lambda flip: flip.moment_y_Nmm)
-    groups: list[list[Flip]] = []
-    for flip in left:
-        if groups and flip.moment_y_Nmm - groups[-1][0].moment_y_Nmm <= GROUP_NMM:
-            groups[-1].append(flip)
-        else:
-            groups.append([flip])
-    large = [group for group in groups if len(group) >= _GROUP_FLIGHTS]
-    named = [(float(np.median([flip.moment_y_Nmm for flip in group])), group) for group in large]
-    return sorted(named, key=lambda item: -len(item[1]))
+    moments = np.array([flip.moment_y_Nmm for flip in found])
+    left = np.ones(len(found), dtype=bool)
+    groups = []
+    while left.any():
+        near = left & (np.abs(moments - moments[:, None]) <= 0.5 * GROUP_NMM)
+        chosen = near[np.argmax(np.where(left, near.sum(axis=1), -1))]
+        if chosen.sum() < _GROUP_FLIGHTS:
+            break
+        groups.append((float(np.median(moments[chosen])), [found[i] for i in np.flatnonzero(chosen)]))
+        left &= ~chosen
+    return groups
 
 
 def _window(world: World, group: Sequence[Flip], moment_y_Nmm: float) -> Window:

@@ -40,7 +40,7 @@ _HANGING_SIGMA_M = 0.01
 _ROUNDS, _EVALUATIONS = 3, 20
 _STEP = 0.02
 """For derivatives, in units of the prior's spread: motion is smooth, the time of a contact is not."""
-_RESAMPLES = 1000
+_RESAMPLES, _NORMAL_95 = 1000, 1.96
 _ALIKE, _SILENT = 0.9, 0.8
 _FITTED_GROUPS = ("world", "body", "rotor", "battery", "aero", "sense", "prop_plate", "base_plate", "plate")
 
@@ -95,6 +95,7 @@ class Identification:
         after: The same of the fitted vehicle.
         words: What the flights cannot tell, one sentence each.
         left_out: Flights that could not be used, one line each.
+        draws: Equally good fits: parameter values of resampled flights, shape (n_draws, n_parameters).
     """
 
     estimates: tuple[Estimate, ...]
@@ -106,6 +107,7 @@ class Identification:
     after: Mapping[str, Any]
     words: tuple[str, ...]
     left_out: tuple[str, ...]
+    draws: FloatArray
 
     def overrides(self) -> dict[str, float]:
         """The fitted values, as overrides of a world."""
@@ -171,18 +173,18 @@ def identify(
     problem = _Problem(vehicle, gear, gear_set, held, dict(zip(names, priors, strict=True)), used)
     x, spread = problem.solve(progress)
     at, blocks = problem.derivatives(x, spread)
-    values, resampled, covariance = problem.resample(x, at, blocks, np.random.default_rng(seed))
+    values, draws, covariance = problem.resample(x, at, blocks, np.random.default_rng(seed))
     sigma = np.sqrt(np.diag(covariance))
     estimates = tuple(
-        Estimate(name, native.library().params[name].unit, prior, float(v), float(s), (float(lo), float(hi)))
-        for name, prior, v, s, (lo, hi) in zip(names, priors, values, sigma, resampled, strict=True)
+        Estimate(name, native.library().params[name].unit, prior, float(v), float(s), (float(v - r), float(v + r)))
+        for name, prior, v, s, r in zip(names, priors, values, sigma, _NORMAL_95 * sigma, strict=True)
     )
     fitted = {**held, **{e.name: e.value for e in estimates}}
     correlation = covariance / np.outer(sigma, sigma)
     before, after = ({"fitted": problem.errors(used, o), "held_out": problem.errors(apart, o)} for o in (held, fitted))
     words = _words(estimates, correlation, len(used))
     labels = tuple(flip.label for flip in used), tuple(flip.label for flip in apart)
-    return Identification(estimates, correlation, *labels, spread, before, after, words, tuple(left_out))
+    return Identification(estimates, correlation, *labels, spread, before, after, words, tuple(left_out), draws)
 
 
 class _Problem:
@@ -232,6 +234,8 @@ class _Problem:
                 x_scale="jac",
                 loss="soft_l1",
                 max_nfev=_EVALUATIONS,
+                ftol=1e-4,
+                xtol=1e-3,
             )
             x = np.asarray(result.x)
             spread = _spread(self.raw(x))
@@ -271,8 +275,8 @@ class _Problem:
 
     def resample(
         self, x: FloatArray, at: list[FloatArray], blocks: list[FloatArray], rng: np.random.Generator
-    ) -> tuple[FloatArray, list[tuple[float, float]], FloatArray]:
-        """Values, 95 % intervals and covariance: flights drawn anew, what they share drawn about itself."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Values, resampled values, covariance: flights are drawn anew, what they share is drawn about itself."""
         # the weights of the fit's robust loss: a flight whose log slipped counts little here as well
         weights = [1.0 / np.sqrt(1.0 + residual**2) for residual in at]
         normal = [block.T @ (w[:, None] * block) for block, w in zip(blocks, weights, strict=True)]
@@ -289,9 +293,7 @@ class _Problem:
         lo, hi = self._bounds()
         spread = self.values(np.clip(np.array(drawn), lo, hi))
         covariance = np.atleast_2d(np.cov(spread.T)) * n / max(n - 1, 1)
-        values = self.values(x)
-        reach = 1.96 * np.sqrt(np.diag(covariance))
-        return values, list(zip(values - reach, values + reach, strict=True)), covariance
+        return self.values(x), spread, covariance
 
 
 class _Rooms:

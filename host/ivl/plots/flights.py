@@ -77,6 +77,8 @@ def _draw_signal(axis: Axes, rows: Sequence[Row], name: str, bands: Sequence[tup
     axis.set_xlim(*_SPAN_S)
     if name == "pitch_deg":
         axis.set_ylim(-20, 300)
+    if name == "height_m":
+        axis.set_ylim(float(low[0]) - 0.3, float(high.max()) + 0.1)
 
 
 def _draw_windows(axis: Axes, windows: Sequence[Window], policies: Sequence[tuple[float, float, float]]) -> None:
