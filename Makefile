@@ -121,7 +121,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 # longest first; some mostly compute, some mostly wait; test-wire flies in real time and has the machine for itself
-SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-report test-analysis test-physics sizes-diff
+SLOW_TESTS := test-py pil test-flight test-links test-mujoco test-sil test-sweep test-report test-analysis test-physics sizes-diff
 
 .PHONY: test
 test: setup-dev toolchain cross-toolchain chromium qt-libraries lint test-c san golden ## everything below, set-up and compilers included
@@ -164,6 +164,11 @@ $(GOLDEN:%=golden-build-%): golden-build-%: toolchain
 test-py: setup-dev build ## tests of the Python package
 	$(say) 'test-py: pytest tests/py'
 	@$(BIN)/python -m pytest tests/py $(PYTEST_ARGS)
+
+.PHONY: test-flight
+test-flight: setup-dev build ## recorded flights: every form of log there and back, damaged files, folders of flights
+	$(say) 'test-flight: pytest tests/flight'
+	@$(BIN)/python -m pytest tests/flight $(PYTEST_ARGS)
 
 .PHONY: test-sil
 test-sil: setup-dev build toolchain qt-libraries ## the software vehicle with unmodified cflib, and a short fuzz of its packets
