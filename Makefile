@@ -165,6 +165,11 @@ test-py: setup-dev build ## tests of the Python package
 	$(say) 'test-py: pytest tests/py'
 	@$(BIN)/python -m pytest tests/py $(PYTEST_ARGS)
 
+.PHONY: test-flight
+test-flight: setup-dev build ## recorded flights: every form of log there and back, damaged files, folders of flights
+	$(say) 'test-flight: pytest tests/flight'
+	@$(BIN)/python -m pytest tests/flight $(PYTEST_ARGS)
+
 .PHONY: test-sil
 test-sil: setup-dev build toolchain qt-libraries ## the software vehicle with unmodified cflib, and a short fuzz of its packets
 	@+$(NATIVE) FLAVOUR=san sil

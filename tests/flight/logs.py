@@ -165,9 +165,15 @@ def habas_rows(
             "Error": error,
         }
         rows.append(names | {"policy": policy, "mu": "[4.2 5. ]", **asked})
-        rows.append(names | {"RREV": -32.767, "Error": "Flip Data"})
+        first = int(np.argmax(truth["triggered"])) or 1
+        rows.append(names | {"z": latched_m(truth, first), "Error": "Flip Data"} if len(truth) > 1 else {})
         rows.append(names | {"Error": "Impact Data"})
     return [*rows, {}]
+
+
+def latched_m(truth: Truth, first: int) -> float:
+    """Height at the trigger, which fired in the middle between two samples."""
+    return float(truth["p_z_m"][first - 1 : first + 1].mean())
 
 
 def habas_text(rows: Sequence[Mapping[str, Any]], note: str = "EXP,Note:a test", end: str = "\r\n") -> str:

@@ -82,6 +82,7 @@ def test_habas2021(truth: Truth, tmp_path: Path) -> None:
     assert info["speed_mps"] == pytest.approx(2.5)
     assert info["angle_deg"] == pytest.approx(60.0)
     assert info["t_trigger_s"] == pytest.approx(truth.t_trigger_s)
+    assert info["trigger_age_s"] == pytest.approx(0.005 + 0.005), "a row tells what came within the 10 ms before it"
     assert info["h_plane_m"] == truth.h_plane_m
     assert (info["reward"], info["judged_by"]) == (110.0, "reward 100")
 

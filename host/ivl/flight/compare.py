@@ -303,10 +303,12 @@ def _groups(found: Sequence[Flip]) -> list[tuple[float, list[Flip]]]:
     groups = []
     while left.any():
         near = left & (np.abs(moments - moments[:, None]) <= 0.5 * GROUP_NMM)
-        chosen = near[np.argmax(np.where(left, near.sum(axis=1), -1))]
+        chosen = near[int(np.argmax(np.where(left, near.sum(axis=1), -1)))]
         if chosen.sum() < _GROUP_FLIGHTS:
             break
-        groups.append((float(np.median(moments[chosen])), [found[i] for i in np.flatnonzero(chosen)]))
+        groups.append(
+            (float(np.median(moments[chosen])), [flip for flip, near_it in zip(found, chosen, strict=True) if near_it])
+        )
         left &= ~chosen
     return groups
 

@@ -18,6 +18,15 @@ from ivl.flight.store import Flight, Flights, Manifest
 _SAME = 0.01
 """Two numbers for one thing may differ by this share: a log is rounded."""
 _LEGS_MAX = 4
+_OPTIONS = {
+    "rrev_c_per_s": "--rrev",
+    "moment_y_Nmm": "--moment",
+    "speed_mps": "--speed",
+    "angle_deg": "--angle",
+    "h_plane_m": "--h-plane",
+    "h_surface_m": "--h-surface",
+}
+"""What can be given for all flights, and by which option."""
 
 
 def run(sources: Sequence[Path], format_name: str, given: Given) -> Flights:
@@ -51,12 +60,13 @@ def run(sources: Sequence[Path], format_name: str, given: Given) -> Flights:
 
 def _complete(flight: Flight, given: Given) -> Flight:
     """Add what the log does not say."""
-    names = ("rrev_c_per_s", "moment_y_Nmm", "speed_mps", "angle_deg", "h_plane_m", "h_surface_m")
     info: dict[str, Any] = dict(flight.info)
-    for name in names:
+    for name, option in _OPTIONS.items():
         value = getattr(given, name)
         if value is None:
             continue
+        if not np.isfinite(value):
+            raise ConfigError(f"{option}: value {value}: must be finite")
         if np.isfinite(info[name]) and abs(info[name] - value) > _SAME * max(abs(value), 1.0):
             raise ConfigError(f"flight {flight.label}: {name}: {value:g} was given, but the log says {info[name]:g}")
         info[name] = info[name] if np.isfinite(info[name]) else value

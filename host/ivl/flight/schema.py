@@ -103,5 +103,17 @@ FLIGHTS = _table(
 )
 """One row a flight: what was asked, and what came of it with who judged it."""
 
+
+def markdown() -> str:
+    """Both tables as they stand in docs/FLIGHT_DATA.md."""
+    parts = []
+    for title, table in (("### A sample", SAMPLES), ("### A flight", FLIGHTS)):
+        rows = [f"| `{c.name}` | {_UNITS.get(c.kind, c.unit)} | {c.doc} |" for c in table.values()]
+        parts.append("\n".join([title, "", "| column | unit | what it is |", "|---|---|---|", *rows]))
+    return "\n\n".join(parts) + "\n"
+
+
+_UNITS = {"str": "text", "bool": "yes, no", "i4": "number"}
+
 POSE = tuple(n for stem in ("p", "v", "q", "w") for n in SAMPLES if n.startswith(f"{stem}_"))
 """What the flight core needs at least: position, velocity, attitude, rates."""

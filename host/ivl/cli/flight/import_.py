@@ -10,22 +10,33 @@ from ivl.errors import ConfigError, IvlError
 
 HELP = """Turn logs of other programs into a folder of flights, which every other command of `ivl flight` reads.
 
-SOURCE is a log file. The folder holds flights.parquet (one row a flight), samples.parquet (the time series, units in
-the names) and manifest.json (source, licence, frames, clock, what is absent). What the log does not say can be given
-as an option; what it says cannot be changed. A damaged file is refused with its line and column.
+SOURCE is a log file, or a folder of them where the format has one. The folder that is made holds flights.parquet (one
+row a flight), samples.parquet (the time series, units in the names) and manifest.json (source, licence, frames, clock,
+what is absent). What the log does not say can be given as an option. What it says cannot be changed, but for the
+outcome. A damaged file is refused with its line and column.
 
 \b
 Examples:
   ivl flight import learning.csv --format habas2021 --out flights/july --licence MIT
-      the study's CSV: the last attempt of each rollout
-  ivl flight import learning.csv --format habas2021 --out flights/all --attempts all
-      the failed attempts too
+      the study's CSV: the last attempt of each rollout (--attempts all: the failed ones too)
+  ivl flight import runs/paper_vertical-bo-seed0 --format ivl --out flights/mine
+      recordings of a run with a vehicle: policy and outcome come from the run
+  ivl flight import logdata/20260801T10-10-10 --format cfclient --out flights/today \\
+      --rrev 4.8 --moment 8 --speed 2.5 --angle 90 --outcome 4,2,0
+      a folder of cfclient: its log blocks on one clock, cut into three flights
+  ivl flight import log00 --format usd --out flights/card --map p_z_m=my.height*0.001
+      a file of the micro-SD card, with a variable of your own, in millimetres
+  ivl flight import landing.npz --format trace --out flights/simulated
+      what `ivl rollout --trace landing.npz` wrote
 """
 
 
 def import_(
-    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Log files.")],
-    format_name: Annotated[str, typer.Option("--format", help="Form of the log; see docs/FLIGHT_DATA.md.")],
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE", help="Log files, or folders of them.")],
+    format_name: Annotated[
+        str,
+        typer.Option("--format", help="habas2021, ivl, trace, cfclient, crazyswarm or usd; see docs/FLIGHT_DATA.md."),
+    ],
     out: Annotated[Path, typer.Option(help="Folder to make.")],
     licence: Annotated[str, typer.Option(help="Terms under which the data may be passed on.")] = "",
     rrev: Annotated[float | None, typer.Option("--rrev", "--rrev-c", help="Policy: RREV_c, 1/s.")] = None,
@@ -65,10 +76,9 @@ def import_(
     if as_json:
         console.print_json({"folder": str(out), **counts, "notes": list(flights.manifest.notes)})
         return
-    console.out.print(
-        f"{out}: {counts['flights']} flights, {counts['usable']} usable, {counts['samples']} samples",
-        highlight=False, markup=False, soft_wrap=True,
-    )  # fmt: skip
+    flown = "1 flight" if len(flights) == 1 else f"{len(flights)} flights"
+    text = f"{out}: {flown}, {counts['usable']} usable, {counts['samples']} samples"
+    console.out.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
 def _outcomes(text: str) -> list[int | None]:
