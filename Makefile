@@ -199,11 +199,6 @@ test-wire: setup-dev build ## CRTP over a CAN bus, and motion capture
 	$(say) 'test-wire: pytest tests/wire'
 	@$(BIN)/python -m pytest tests/wire $(PYTEST_ARGS)
 
-.PHONY: test-flight
-test-flight: setup-dev build ## recorded flights
-	$(say) 'test-flight: pytest tests/flight'
-	@$(BIN)/python -m pytest tests/flight $(PYTEST_ARGS)
-
 .PHONY: test-physics
 test-physics: setup-dev build ## landings with known properties, and a sample of the step-size study
 	$(say) 'test-physics: pytest tests/physics'
