@@ -87,7 +87,7 @@ class Replayed:
 
 
 def summary(replayed: Sequence[Replayed], step: float) -> dict[str, Any]:
-    """The whole comparison as one JSON object; see docs/FLIGHT_DATA.md for its members."""
+    """The whole comparison as one JSON object; see docs/REPLAY.md for its members."""
     flights = [_of_flight(r, step) for r in replayed]
     return {
         "n_flights": len(replayed),

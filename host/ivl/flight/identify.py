@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy import stats  # type: ignore[import-untyped]
 from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
 from ivl import model, native
@@ -37,10 +38,10 @@ _LOOKS = {"pitch": 3.0, "rate": 3.0, "height": 3.0, "contact": 1.0}
 _CONTACT_FAR_S = 0.04
 _HANGING_SIGMA_M = 0.01
 """Of the tracked point above the centre of mass, twice: it hangs as far below as it flew above."""
-_ROUNDS, _EVALUATIONS = 3, 20
+_ROUNDS, _EVALUATIONS, _SETTLED = 6, 20, 0.05
 _STEP = 0.02
 """For derivatives, in units of the prior's spread: motion is smooth, the time of a contact is not."""
-_RESAMPLES, _NORMAL_95 = 1000, 1.96
+_RESAMPLES = 1000
 _ALIKE, _SILENT = 0.9, 0.8
 _FITTED_GROUPS = ("world", "body", "rotor", "battery", "aero", "sense", "prop_plate", "base_plate", "plate")
 
@@ -175,9 +176,10 @@ def identify(
     at, blocks = problem.derivatives(x, spread)
     values, draws, covariance = problem.resample(x, at, blocks, np.random.default_rng(seed))
     sigma = np.sqrt(np.diag(covariance))
+    reach = float(stats.t.ppf(0.975, max(len(used) - 1, 1))) * sigma  # few flights tell their own spread badly
     estimates = tuple(
         Estimate(name, native.library().params[name].unit, prior, float(v), float(s), (float(v - r), float(v + r)))
-        for name, prior, v, s, r in zip(names, priors, values, sigma, _NORMAL_95 * sigma, strict=True)
+        for name, prior, v, s, r in zip(names, priors, values, sigma, reach, strict=True)
     )
     fitted = {**held, **{e.name: e.value for e in estimates}}
     correlation = covariance / np.outer(sigma, sigma)
@@ -237,11 +239,14 @@ class _Problem:
                 ftol=1e-4,
                 xtol=1e-3,
             )
+            moved = float(np.abs(result.x - x).max())
             x = np.asarray(result.x)
             spread = _spread(self.raw(x))
             if progress:
                 named = ", ".join(f"{n} {v:.4g}" for n, v in zip(self._priors, self.values(x), strict=True))
-                progress(f"round {number + 1} of {_ROUNDS}: {named}; pitch {spread['pitch']:.1f} deg")
+                progress(f"round {number + 1}: {named}; pitch {spread['pitch']:.1f} deg")
+            if moved < _SETTLED:
+                break
         return x, spread
 
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -328,10 +333,16 @@ def _residuals(world: World, flip: Flip) -> dict[str, FloatArray]:
         "rate": (rate - motion.clip_rate(flip.rate_radps))[used],
         "height": (simulated.height_m - flip.height_m)[used],
     }
-    late = simulated.t_contact_s - flip.t_contact_s
-    near = np.isfinite(late) and abs(late) < _CONTACT_FAR_S
-    parts["contact"] = np.array([late]) if near else np.zeros(1)
+    parts["contact"] = np.array([_contact_error(simulated.t_contact_s, flip.t_contact_s)])
     return parts
+
+
+def _contact_error(simulated_s: float, recorded_s: float) -> float:
+    """Simulated minus recorded; a contact that the simulation lacks counts as one that is far off."""
+    if not np.isfinite(recorded_s):
+        return 0.0
+    late = simulated_s - recorded_s if np.isfinite(simulated_s) else _CONTACT_FAR_S
+    return float(np.clip(late, -_CONTACT_FAR_S, _CONTACT_FAR_S))
 
 
 def _weighted(raw: Sequence[Mapping[str, FloatArray]], spread: Mapping[str, float]) -> list[FloatArray]:

@@ -68,7 +68,7 @@ def _flight(path: Path, known: dict[str, Any], given: Given) -> Flight:
     first, columns["triggered"] = trigger(columns["phase"])
     info = {"h_plane_m": plane(columns["p_z_m"] + columns["d_ceil_m"]), "source": path.name, **known}
     if first is not None:
-        info["t_trigger_s"] = t_s[first] - t_s[0]
+        info |= {"t_trigger_s": t_s[first] - t_s[0], "trigger_age_s": 0.0}
     return make_flight(info, {"t_s": t_s - t_s[0], **columns})
 
 

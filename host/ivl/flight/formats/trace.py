@@ -61,7 +61,7 @@ def _flight(path: Path, given: Given) -> Flight:
         "judged_by": "simulator",
     }
     if first is not None:
-        info["t_trigger_s"] = t_s[first] - t_s[0]
+        info |= {"t_trigger_s": t_s[first] - t_s[0], "trigger_age_s": 0.0}
     return make_flight(info, {"t_s": t_s - t_s[0], **columns})
 
 
