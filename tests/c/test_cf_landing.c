@@ -71,6 +71,21 @@ static ivl_sim_spec_t draw_spec(draws_t *draws, ivl_sim_start_t start)
     };
 }
 
+static ivl_sim_spec_t spec_of(double speed_mps, double angle_deg, double rrev_c_per_s, double moment_y_Nmm, double d_ceil_m, uint64_t seed,
+                              uint64_t stream, ivl_sim_start_t start)
+{
+    return (ivl_sim_spec_t){
+        .speed_mps = {speed_mps},
+        .angle_deg = {angle_deg},
+        .rrev_c_per_s = {rrev_c_per_s},
+        .moment_y_Nmm = {moment_y_Nmm},
+        .d_ceil_m = {d_ceil_m},
+        .seed = {seed},
+        .stream = {stream},
+        .start = {(int32_t)start},
+    };
+}
+
 static void write_spec(const ivl_sim_spec_t *spec)
 {
     write_u32("sil", "seed_lo", (uint32_t)spec->seed[0]);
@@ -158,7 +173,7 @@ static void test_speed_and_angle_come_from_the_command_unless_a_parameter_tells_
 {
     ivl_sim_model_t model;
     open_noisy(&model);
-    ivl_sim_spec_t          spec = {{2.2}, {70.1}, {4.1}, {8.3}, {0.5}, {3}, {4}, {IVL_SIM_START_IMPARTED}, {0}};
+    ivl_sim_spec_t          spec = spec_of(2.2, 70.1, 4.1, 8.3, 0.5, 3, 4, IVL_SIM_START_IMPARTED);
     const ivl_sim_outcome_t precise = fly_linked(&model, &spec), flown_precise = fly(&spec, 1);
     TEST_ASSERT_EQUAL_MEMORY(&precise, &flown_precise, sizeof precise);
     // parameters of another landing are not taken for this one's
@@ -207,7 +222,7 @@ static void test_an_approach_as_flown_begins_where_the_vehicle_hovers_and_is_jud
     open_vehicle(&model);
     TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit_config(1).status);
     // from where a flown start of the same landing begins, but at rest in the vehicle's own hands
-    ivl_sim_spec_t          spec = {{2.5}, {90.0}, {5.0}, {8.0}, {0.5}, {0}, {0}, {IVL_SIM_START_FLOWN}, {0}};
+    ivl_sim_spec_t          spec = spec_of(2.5, 90.0, 5.0, 8.0, 0.5, 0, 0, IVL_SIM_START_FLOWN);
     const ivl_sim_outcome_t expected = fly_linked(&model, &spec);
     hover_z_m = (float)(2.1 - (0.5 * 2.5 * 2.5 / (double)model.firmware.approach_accel_mps2 + 2.5 * params.start_hold_time_s));
     write_f32("sil", "start_z", hover_z_m);
@@ -231,7 +246,7 @@ static void test_a_vehicle_that_hangs_is_crashed_and_a_reset_makes_it_fly(void)
     const ivl_sim_model_t model = fixture_model(&params);
     open_vehicle(&model);
     TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit_config(1).status);
-    const ivl_sim_spec_t    spec = {{2.5}, {90.0}, {5.0}, {8.0}, {0.5}, {1}, {0}, {IVL_SIM_START_IMPARTED}, {0}};
+    const ivl_sim_spec_t    spec = spec_of(2.5, 90.0, 5.0, 8.0, 0.5, 1, 0, IVL_SIM_START_IMPARTED);
     const ivl_sim_outcome_t o = fly(&spec, 1);
     TEST_ASSERT_EQUAL_INT(4, o.n_legs[0]);
     run_ms(2000);
@@ -251,7 +266,7 @@ static void test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_ti
 {
     ivl_sim_model_t model;
     open_noisy(&model);
-    const ivl_sim_spec_t spec = {{2.5}, {90.0}, {5.0}, {8.0}, {0.5}, {1}, {0}, {IVL_SIM_START_IMPARTED}, {0}};
+    const ivl_sim_spec_t spec = spec_of(2.5, 90.0, 5.0, 8.0, 0.5, 1, 0, IVL_SIM_START_IMPARTED);
     run_ms(1000);
     (void)fly(&spec, 99);
     run_ms(1500);
@@ -276,7 +291,7 @@ static void test_the_recording_of_a_landing_begins_at_its_start(void)
 {
     ivl_sim_model_t model;
     open_noisy(&model);
-    const ivl_sim_spec_t    spec = {{2.5}, {90.0}, {5.0}, {8.0}, {0.4}, {1}, {0}, {IVL_SIM_START_AT_TRIGGER}, {0}};
+    const ivl_sim_spec_t    spec = spec_of(2.5, 90.0, 5.0, 8.0, 0.4, 1, 0, IVL_SIM_START_AT_TRIGGER);
     const ivl_sim_outcome_t o = fly(&spec, 7);
     size_t                  n;
     ivl_record_header_t     header;
@@ -288,7 +303,7 @@ static void test_a_landing_may_be_asked_for_on_the_floor(void)
 {
     ivl_sim_model_t model;
     open_noisy(&model);
-    const ivl_sim_spec_t spec = {{2.5}, {80.0}, {5.0}, {8.0}, {0.4}, {8}, {9}, {IVL_SIM_START_IMPARTED}, {0}};
+    const ivl_sim_spec_t spec = spec_of(2.5, 80.0, 5.0, 8.0, 0.4, 8, 9, IVL_SIM_START_IMPARTED);
     run_ms(200);
     TEST_ASSERT_EQUAL_INT(1, (int)read_log("sil", "grounded"));
     (void)send_policy(7, 5.0f, 0.008f);
@@ -307,7 +322,7 @@ static void test_numbers_of_a_start_are_kept_within_their_ranges(void)
     ivl_sim_model_t model;
     open_noisy(&model);
     // a distance out of range is put back into it when it is written
-    const ivl_sim_spec_t spec = {{2.5}, {90.0}, {5.0}, {8.0}, {1.0e-9}, {1}, {0}, {IVL_SIM_START_AT_TRIGGER}, {0}};
+    const ivl_sim_spec_t spec = spec_of(2.5, 90.0, 5.0, 8.0, 1.0e-9, 1, 0, IVL_SIM_START_AT_TRIGGER);
     (void)fly(&spec, 1);
     TEST_ASSERT_DOUBLE_WITHIN(0.0, 0.5, *(const double *)find_param("sil", "d_ceil")->address);
     write_u8("sil", "start", 77);
