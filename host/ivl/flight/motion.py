@@ -23,7 +23,7 @@ MOTION_S = 0.2
 """Motion is compared up to this long after the trigger, or to the contact."""
 _BEFORE_S, _THRUST_S = 0.1, 0.03
 GRAVITY_MPS2 = 9.81
-_SETTLED_S = (0.3, 1.0)
+_SETTLED_S = (0.5, 1.0)
 _CONTACT_AFTER_S, _CONTACT_RATE_RADPS, _CONTACT_DROP_RADPS = 0.06, 8.0, 1.5
 _CONTACT_WINDOW_S = 0.01
 _CLIP_SHARE = 0.93
@@ -46,6 +46,7 @@ class Flip:
         h_surface_m: Height of the ceiling's surface in W, NaN if it was not measured.
         state: State at the trigger as the vehicle sensed it; rotor speeds unknown, battery without load if known.
         climb_mps2: Vertical acceleration before the trigger.
+        climb_age_s: How long before the trigger that was, on average.
         t_s: Times of the samples after the trigger that are no repeats, shape (n,).
         pitch_deg: Nose-up rotation, unwrapped, shape (n,).
         rate_radps: Nose-up rate, shape (n,).
@@ -63,6 +64,7 @@ class Flip:
     h_surface_m: float
     state: State
     climb_mps2: float
+    climb_age_s: float
     t_s: FloatArray
     pitch_deg: FloatArray
     rate_radps: FloatArray
@@ -104,7 +106,7 @@ def flip(flight: Flight) -> Flip:
     after = fresh & (t_s > 0)
     if before.sum() < 3 or after.sum() < 5:
         raise ConfigError(f"flight {flight.label}: too few samples around the trigger")
-    climb = _climb(flight, t_s, before)
+    climb, climb_age_s = _climb(flight, t_s, before)
     state = State(
         p_W_m=flight.stack("p", "xyz", "m")[at],
         v_W_mps=flight.stack("v", "xyz", "mps")[at],
@@ -123,6 +125,7 @@ def flip(flight: Flight) -> Flip:
         h_surface_m=float(flight.info["h_surface_m"]),
         state=state,
         climb_mps2=climb,
+        climb_age_s=climb_age_s,
         t_s=t_s[after],
         pitch_deg=pitch[after],
         rate_radps=rate[after],
@@ -149,15 +152,24 @@ def start_state(world: World, flip: Flip) -> State:
     """The true state at the trigger: what was sensed, `sense.latency` later; rotors that give the recorded climb."""
     values = world.params.values
     lag_s = values["sense.latency"]
-    v_W_mps = np.asarray(flip.state.v_W_mps) + np.array([0.0, 0.0, flip.climb_mps2 * lag_s])
+    climb = _present_climb(world, flip)
+    v_W_mps = np.asarray(flip.state.v_W_mps) + np.array([0.0, 0.0, climb * lag_s])
     p_W_m = np.asarray(flip.state.p_W_m) + lag_s * v_W_mps
-    climb_mps = float(v_W_mps[2])
-    force_N = world.derived()["mass_total_kg"] * (values["world.gravity"] + flip.climb_mps2)
-    force_N += values["aero.drag_z"] * climb_mps
-    air = max(1.0 - values["rotor.inflow_loss"] * max(climb_mps, 0.0), 0.1)
+    climb_rate = float(v_W_mps[2])
+    force_N = world.derived()["mass_total_kg"] * (values["world.gravity"] + climb) + values["aero.drag_z"] * climb_rate
+    air = max(1.0 - values["rotor.inflow_loss"] * max(climb_rate, 0.0), 0.1)
     most = world.derived()["rotor_speed_max_radps"]
     speed = float(np.sqrt(max(force_N, 0.0) / (4.0 * values["rotor.thrust_constant"] * air)))
     return replace(flip.state, p_W_m=p_W_m, v_W_mps=v_W_mps, rotor_radps=np.full(4, min(speed, most)))
+
+
+def _present_climb(world: World, flip: Flip) -> float:
+    """Vertical acceleration at the trigger: the recorded one is older, and drag and inflow have lowered it since."""
+    values = world.params.values
+    mass_kg = world.derived()["mass_total_kg"]
+    thrust_N = mass_kg * (values["world.gravity"] + flip.climb_mps2)
+    rate_per_s = (values["aero.drag_z"] + values["rotor.inflow_loss"] * thrust_N) / mass_kg
+    return flip.climb_mps2 * float(np.exp(-rate_per_s * flip.climb_age_s))
 
 
 def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> Simulated:
@@ -218,8 +230,8 @@ def pitch_deg(q_WB: FloatArray) -> FloatArray:
     return np.asarray(np.degrees(np.unwrap(np.arctan2(nose_z, up_z))))
 
 
-def _climb(flight: Flight, t_s: FloatArray, before: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
-    """Vertical acceleration just before the trigger: from the accelerometer, else from the slope of the climb.
+def _climb(flight: Flight, t_s: FloatArray, before: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[float, float]:
+    """Vertical acceleration before the trigger, and its age: from the accelerometer, else from the slope of the climb.
 
     It gives the thrust, on which the flip depends much: 1 % of rotor speed turns it by 5 degrees in 200 ms.
     """
@@ -228,8 +240,8 @@ def _climb(flight: Flight, t_s: FloatArray, before: np.ndarray[tuple[int], np.dt
     if len(force) and np.isfinite(force).all():
         x, y, z, w = flight.stack("q", "xyzw")[last].T
         up = np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
-        return float(np.mean(np.sum(up * force, axis=1))) - GRAVITY_MPS2
-    return float(np.polyfit(t_s[before], flight["v_z_mps"][before], 1)[0])
+        return float(np.mean(np.sum(up * force, axis=1))) - GRAVITY_MPS2, -float(np.mean(t_s[last]))
+    return float(np.polyfit(t_s[before], flight["v_z_mps"][before], 1)[0]), -float(np.mean(t_s[before]))
 
 
 def contact_time(t_s: FloatArray, rate_radps: FloatArray, window_s: float) -> float:
