@@ -350,6 +350,21 @@ def test_card_file_with_numbers_that_are_none(refused: Refused, truth: Truth, tm
     assert refused(path, form="usd") == f"{path}: event 8: stateEstimate.vz: value inf where a number must be"
 
 
+def test_card_file_with_a_signalling_nan(truth: Truth, tmp_path: Path) -> None:
+    columns = {**truth.columns, "v_z_mps": np.where(np.arange(len(truth)) == 7, 1234.5, truth["v_z_mps"])}
+    path = tmp_path / "log00"
+    path.write_bytes(closed(usd(Truth(columns))[:-4].replace(struct.pack("<f", 1234.5), struct.pack("<I", 0x7FA00000))))
+    (flight,) = importer.run([path], "usd", Given())
+    assert len(flight) == len(truth) - 1
+
+
+@pytest.mark.parametrize("value", ["1e300", "-1e31", "9" * 400])
+def test_number_too_large_for_any_unit(refused: Refused, truth: Truth, tmp_path: Path, value: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(edit(cfclient_text(truth, [*BLOCKS["motion"], *BLOCKS["imu"]]), 9, "acc.y", value))
+    assert refused(path, form="cfclient").startswith(f"{path}: line 9: acc.y: value {value[:30]}")
+
+
 @pytest.mark.parametrize(
     ("arrays", "text"),
     [

@@ -223,7 +223,8 @@ def flights(merged: Merged) -> Iterator[IntArray]:
     """Rows of each flight, in the order flown.
 
     Rows without a whole pose (as far as the log has one) are left out. A flight ends with a pause of the clock, and
-    where the flight core begins its next landing: at READY, or without phases at a new policy.
+    where the flight core begins its next landing: at READY, or when it is back before a flip; without phases at a new
+    policy.
     """
     pose = [merged.columns[name] for name in POSE if name in merged.columns]
     rows = np.flatnonzero(np.isfinite(pose).all(axis=0)) if pose else np.arange(len(merged.t_s))
@@ -232,7 +233,8 @@ def flights(merged: Merged) -> Iterator[IntArray]:
     starts = np.diff(merged.t_s[rows]) > GAP_S
     phase = merged.columns.get("phase")
     if phase is not None:
-        starts |= (phase[rows][1:] == READY) & (phase[rows][:-1] != READY)
+        before, now = phase[rows][:-1], phase[rows][1:]
+        starts |= ((now == READY) & (before != READY)) | ((now <= APPROACH) & (before > APPROACH))
     elif "ivl.policy_seq" in merged.columns:
         policy = merged.columns["ivl.policy_seq"][rows]
         starts |= (np.diff(policy) != 0) & np.isfinite(np.diff(policy))

@@ -25,7 +25,7 @@ _GRAM_N = 9.81e-3
 _MOMENT = 4 * 0.04 * math.sqrt(0.5) * _GRAM_N
 """N m per unit of Mx and My, which are gram-force added to each motor, at a lever of 40 mm cos 45 degrees."""
 _PERIOD_S = 0.01
-_N_SAMPLES_MIN, _CLIMB_MPS = 10, 0.7
+_N_SAMPLES_MIN, _CLIMB_MPS, _RREV_PER_S = 10, 0.7, 0.01
 _REWARD_PER_M = 10 / 2.10
 """Return per metre of the highest point; the rest of the return is for the feet."""
 _FEET_BY_REWARD = ((75.0, 4), (15.0, 2), (5.0, 1))
@@ -180,7 +180,9 @@ def _keys(table: Table) -> list[tuple[str, str]]:
 def _plane(samples: Table) -> float:
     """Height for which the vehicle computed RREV = v_z / d, m; NaN if too few samples tell."""
     z, vz, rrev = (samples.numbers(name) for name in ("z", "vz", "RREV"))
-    telling = (vz > _CLIMB_MPS) & (rrev > 0) & np.array([flag == "False" for flag in samples.text("flip_flag")])
+    telling = (
+        (vz > _CLIMB_MPS) & (rrev > _RREV_PER_S) & np.array([flag == "False" for flag in samples.text("flip_flag")])
+    )
     if telling.sum() < _N_SAMPLES_MIN:
         return float("nan")
     return round(float(np.median(z[telling] + vz[telling] / rrev[telling])), 3)
