@@ -129,6 +129,12 @@ def test_no_file(refused: Refused, tmp_path: Path, form: str) -> None:
 
 
 @each_form
+def test_name_that_no_file_can_have(refused: Refused, tmp_path: Path, form: str) -> None:
+    path = tmp_path / ("a" * 300)
+    assert refused(path, form=form) == f"{path}: cannot be read: File name too long"
+
+
+@each_form
 def test_folder_in_place_of_a_file(refused: Refused, tmp_path: Path, form: str) -> None:
     folder = tmp_path / "logs"
     folder.mkdir()
@@ -294,6 +300,7 @@ def test_one_damaged_file_of_a_folder_is_named(refused: Refused, truth: Truth, t
         ("flip_flag", "Maybe", "flip_flag: value 'Maybe' is neither True nor False"),
         ("k_ep", "1.5", "k_ep: value '1.5' is no whole number"),
         ("policy", "[3.7 six]", "policy: value '[3.7 six]' is no list of numbers"),
+        ("policy", "[3.7 inf]", "policy: value '[3.7 inf]' is no list of numbers"),
         ("policy", "[3.7]", "policy: value '[3.7]': expected [RREV_c M_yd]"),
         ("reward", "good", "reward: value 'good' is no number"),
         ("vz", "up", "vz: value 'up' is no number"),

@@ -16,7 +16,7 @@ from ivl.flight.log import GAP_S, Given, fresh_only
 from ivl.flight.phases import APPROACH, READY
 from ivl.flight.schema import POSE
 from ivl.flight.store import FloatArray
-from ivl.flight.table import IntArray, Rule, Table, samples, shorten
+from ivl.flight.table import IntArray, Rule, Table, is_folder, samples, shorten
 
 _SMOOTH = ("p_", "v_", "q_", "w_", "f_", "track_", "rotor_", "battery_")
 _STATE_S, _TRACK_S, _PERIODS = 0.25, 0.05, 3
@@ -73,11 +73,14 @@ def files_of(path: Path, suffixes: Sequence[str]) -> list[Path]:
     """The file itself, or the files of a folder in the order of their names.
 
     Raises:
-        ConfigError: The folder has none.
+        ConfigError: The folder has none, or cannot be read.
     """
-    if not path.is_dir():
+    if not is_folder(path):
         return [path]
-    files = sorted(file for file in path.iterdir() if file.suffix in suffixes and not file.name.startswith("."))
+    try:
+        files = sorted(file for file in path.iterdir() if file.suffix in suffixes and not file.name.startswith("."))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from error
     if not files:
         raise ConfigError(f"{path}: no {' or '.join(suffixes)} file in this folder")
     return files

@@ -159,13 +159,21 @@ def shorten(text: str, n: int = _SHOWN) -> str:
     return text if len(text) <= n else text[: n - 3] + "..."
 
 
+def is_folder(path: Path) -> bool:
+    """Whether this is a folder; what cannot be looked at is none."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
 def read_bytes(path: Path) -> bytes:
     """The content of a file.
 
     Raises:
         ConfigError: There is none, it is a folder, it cannot be read, or it is empty.
     """
-    if path.is_dir():
+    if is_folder(path):
         raise ConfigError(f"{path}: is a folder, this format reads files")
     try:
         data = path.read_bytes()
