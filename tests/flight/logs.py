@@ -257,7 +257,15 @@ def variables(truth: Truth) -> dict[str, Array]:
     result |= {f"ivl.thrust{i}": c[f"thrust_{i}_N"] for i in "1234"}
     result |= {"ivl.thrust_total": c["thrust_cmd_N"], "ivl.moment_y": c["moment_cmd_y_Nm"], "ivl.phase": c["phase"]}
     result |= {"ivl.d_ceil": c["d_ceil_m"], "ivl.rrev": c["rrev_per_s"], "ivl.of_y": c["of_y_radps"]}
-    result |= {"pm.vbat": c["battery_V"]}
+    result |= {"pm.vbat": c["battery_V"], "pm.vbatMV": np.rint(1000 * c["battery_V"])}
+    result |= {f"kalman.state{axis.upper()}": c[f"p_{axis}_m"] for axis in "xyz"}
+    result |= {f"kalman.q{i}": c[f"q_{axis}"] for i, axis in enumerate("wxyz")}
+    result |= {f"lighthouse.{axis}": c[f"track_p_{axis}_m"] for axis in "xyz"}
+    result |= {f"ext_pos.{axis.upper()}": c[f"track_p_{axis}_m"] for axis in "xyz"}
+    result |= {f"ctrltargetZ.{axis}": np.trunc(1000 * c[f"set_p_{axis}_m"]) for axis in "xyz"}
+    result |= {f"ctrltargetZ.v{axis}": np.trunc(1000 * c[f"set_v_{axis}_mps"]) for axis in "xyz"}
+    result |= {f"rpm.m{i}": np.rint(c[f"rotor_{i}_radps"] * 60 / (2 * math.pi)) for i in "1234"}
+    result |= {f"ivl.pwm{i}": np.rint(65535 * c[f"pwm_{i}_norm"]) for i in "1234"}
     n = np.ones(len(truth))
     result |= {"ivl.rrev_c": truth.rrev_c_per_s * n, "ivl.moment_c": truth.moment_y_Nmm / 1000 * n}
     return result | {"ivl.n_trigger": 3 + c["triggered"], "ivl.policy_seq": 7 * n}

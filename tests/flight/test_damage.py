@@ -129,6 +129,12 @@ def test_no_file(refused: Refused, tmp_path: Path, form: str) -> None:
 
 
 @each_form
+def test_name_that_no_file_can_have(refused: Refused, tmp_path: Path, form: str) -> None:
+    path = tmp_path / ("a" * 300)
+    assert refused(path, form=form) == f"{path}: cannot be read: File name too long"
+
+
+@each_form
 def test_folder_in_place_of_a_file(refused: Refused, tmp_path: Path, form: str) -> None:
     folder = tmp_path / "logs"
     folder.mkdir()
@@ -294,6 +300,7 @@ def test_one_damaged_file_of_a_folder_is_named(refused: Refused, truth: Truth, t
         ("flip_flag", "Maybe", "flip_flag: value 'Maybe' is neither True nor False"),
         ("k_ep", "1.5", "k_ep: value '1.5' is no whole number"),
         ("policy", "[3.7 six]", "policy: value '[3.7 six]' is no list of numbers"),
+        ("policy", "[3.7 inf]", "policy: value '[3.7 inf]' is no list of numbers"),
         ("policy", "[3.7]", "policy: value '[3.7]': expected [RREV_c M_yd]"),
         ("reward", "good", "reward: value 'good' is no number"),
         ("vz", "up", "vz: value 'up' is no number"),
@@ -348,6 +355,21 @@ def test_card_file_with_numbers_that_are_none(refused: Refused, truth: Truth, tm
     path = tmp_path / "log00"
     path.write_bytes(usd(Truth(columns)))
     assert refused(path, form="usd") == f"{path}: event 8: stateEstimate.vz: value inf where a number must be"
+
+
+def test_card_file_with_a_signalling_nan(truth: Truth, tmp_path: Path) -> None:
+    columns = {**truth.columns, "v_z_mps": np.where(np.arange(len(truth)) == 7, 1234.5, truth["v_z_mps"])}
+    path = tmp_path / "log00"
+    path.write_bytes(closed(usd(Truth(columns))[:-4].replace(struct.pack("<f", 1234.5), struct.pack("<I", 0x7FA00000))))
+    (flight,) = importer.run([path], "usd", Given())
+    assert len(flight) == len(truth) - 1
+
+
+@pytest.mark.parametrize("value", ["1e300", "-1e31", "9" * 400])
+def test_number_too_large_for_any_unit(refused: Refused, truth: Truth, tmp_path: Path, value: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(edit(cfclient_text(truth, [*BLOCKS["motion"], *BLOCKS["imu"]]), 9, "acc.y", value))
+    assert refused(path, form="cfclient").startswith(f"{path}: line 9: acc.y: value {value[:30]}")
 
 
 @pytest.mark.parametrize(

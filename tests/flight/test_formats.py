@@ -1,5 +1,6 @@
 """Each form of log, written from a landing with known truth, comes back as that truth: every column, unit and sign."""
 
+import datetime
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -157,6 +158,27 @@ def test_cfclient_with_every_block_in_a_file_of_its_own(truth: Truth, tmp_path: 
     assert math.isnan(info["n_legs"])
 
 
+def test_file_that_the_client_itself_writes(truth: Truth, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import cfclient
+    from cfclient.utils.logdatawriter import LogWriter
+    from cflib.crazyflie.log import LogConfig
+
+    monkeypatch.setattr(cfclient, "config_path", str(tmp_path))
+    block = LogConfig("my/block", 10)
+    for name in BLOCKS["motion"]:
+        block.add_variable(name, "float")
+    writer = LogWriter(block, datetime.datetime(2026, 8, 1))
+    writer.start()
+    values = variables(truth)
+    for i, t_s in enumerate(truth["t_s"]):
+        row = {name: float(values[name][i]) for name in BLOCKS["motion"]}
+        block.data_received_cb.call(round(1000 * t_s), row, block)
+    writer.stop()
+    (flight,) = read("cfclient", tmp_path / "logdata" / "20260801T00-00-00")
+    assert flight.label.startswith("my-block-")
+    agree(flight, truth, POSE[:6])
+
+
 def test_usd_with_several_events(truth: Truth, tmp_path: Path) -> None:
     path = tmp_path / "log07"
     path.write_bytes(usd_bytes(truth, {block: (names, 1) for block, names in BLOCKS.items()}))
@@ -201,6 +223,39 @@ def test_compressed_state(truth: Truth, tmp_path: Path) -> None:
     (flight,) = read("cfclient", path)
     agree(flight, truth, [*POSE[:6], *POSE[10:]], 0.0011)
     agree(flight, truth, POSE[6:10], 0.003)
+
+
+@pytest.mark.parametrize(
+    ("names", "columns", "tolerance"),
+    [
+        ([f"kalman.state{axis}" for axis in "XYZ"], POSE[:3], 1e-9),
+        ([f"kalman.q{i}" for i in range(4)], POSE[6:10], 1e-9),
+        ([f"lighthouse.{axis}" for axis in "xyz"], TRACK[:3], 1e-9),
+        ([f"ext_pos.{axis}" for axis in "XYZ"], TRACK[:3], 1e-9),
+        ([f"ctrltargetZ.{axis}" for axis in ("x", "y", "z", "vx", "vy", "vz")], SET, 0.0011),
+        ([f"rpm.m{i}" for i in range(1, 5)], [f"rotor_{i}_radps" for i in range(1, 5)], 1e-9),
+        ([f"ivl.pwm{i}" for i in range(1, 5)], [f"pwm_{i}_norm" for i in range(1, 5)], 1e-9),
+        (["pm.vbatMV"], ["battery_V"], 0.00051),
+        (["ivl.n_trigger"], ["triggered"], 1e-9),
+    ],
+)
+def test_what_the_firmware_logs_by_another_name(
+    truth: Truth, tmp_path: Path, names: list[str], columns: list[str], tolerance: float
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(cfclient_text(truth, names))
+    (flight,) = read("cfclient", path)
+    agree(flight, truth, columns, tolerance)
+    only(flight, columns)
+
+
+def test_first_of_two_names_is_taken(truth: Truth, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(
+        cfclient_text(truth, [*BLOCKS["motion"], "stateEstimateZ.x", "kalman.stateX", "pm.vbatMV", "pm.vbat"])
+    )
+    (flight,) = read("cfclient", path)
+    agree(flight, truth, [*POSE[:6], "battery_V"])
 
 
 @pytest.mark.parametrize("form", ["csv", "npz"])

@@ -31,7 +31,7 @@ def test_last_attempt_counts_and_all_can_be_had(truth: Truth, tmp_path: Path) ->
     every = read(path, rows, ALL)
     assert [f.label for f in every] == ["ep1-run2-try1", "ep1-run2-try2", "ep1-run2-try3", "ep1-run3"]
     assert [f.info["usable"] for f in every] == [False, False, True, True]
-    assert every[0].info["note"] == "the log says: Failed Rollout; 1 samples"
+    assert every[0].info["note"] == "the log says: Failed Rollout; no more than 1 sample"
     assert all(f["t_s"][0] == 0.0 for f in every)
 
 

@@ -115,6 +115,15 @@ def test_flights_are_cut_where_the_flight_core_is_ready_again(truth: Truth, tmp_
         assert flight["phase"][0] == 1
 
 
+def test_flights_are_cut_where_the_flight_core_is_back_before_a_flip(truth: Truth, tmp_path: Path) -> None:
+    """A log too slow to see `ready` sees the approach after the end of the last flight."""
+    names = [*BLOCKS["motion"], "ivl.phase"]
+    path = tmp_path / "a.csv"
+    path.write_text(joined(*(cfclient_text(later(truth, i * len(truth) * 0.01), names) for i in range(2))))
+    flights = read(path)
+    assert [len(flight) for flight in flights] == [len(truth)] * 2
+
+
 def test_without_phases_a_new_policy_begins_a_flight(truth: Truth, tmp_path: Path) -> None:
     names = [*BLOCKS["motion"], "ivl.policy_seq", "ivl.n_trigger"]
     texts = []

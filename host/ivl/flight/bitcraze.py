@@ -27,7 +27,7 @@ _QUATERNION_BITS, _QUATERNION_MAX = 9, 2.0**32 - 1
 _GROUPS: tuple[Sequence[Rule], ...] = (
     rules("p", "xyz", "m", "stateEstimate.{}"),
     rules("p", "xyz", "m", "stateEstimateZ.{}", 1e-3),
-    rules("p", "xyz", "m", "kalman.state{}"),
+    [Rule(f"p_{axis}_m", f"kalman.state{axis.upper()}") for axis in "xyz"],
     rules("v", "xyz", "mps", "stateEstimate.v{}"),
     rules("v", "xyz", "mps", "stateEstimateZ.v{}", 1e-3),
     rules("q", "xyzw", "", "stateEstimate.q{}"),
@@ -42,7 +42,7 @@ _GROUPS: tuple[Sequence[Rule], ...] = (
     rules("track_p", "xyz", "m", "locSrv.{}"),
     rules("track_q", "xyzw", "", "locSrv.q{}"),
     rules("track_p", "xyz", "m", "lighthouse.{}"),
-    rules("track_p", "xyz", "m", "ext_pos.{}"),
+    [Rule(f"track_p_{axis}_m", f"ext_pos.{axis.upper()}") for axis in "xyz"],
     rules("set_p", "xyz", "m", "ctrltarget.{}"),
     rules("set_p", "xyz", "m", "ctrltargetZ.{}", 1e-3),
     rules("set_v", "xyz", "mps", "ctrltarget.v{}"),
@@ -65,10 +65,10 @@ _GROUPS: tuple[Sequence[Rule], ...] = (
 _FACTS = ("ivl.rrev_c", "ivl.moment_c", "ivl.policy_seq", "ivl.n_trigger", "ivl.trg_seq")
 """Variables of the app that are no samples, but tell what was flown."""
 FRAMES = (
-    "World and body as the firmware has them: world z up; body x forward, y left, z up; quaternion body to world. "
-    "gyro in deg/s and acc in g as they are. Where only roll, pitch and yaw are logged, the attitude is made of them "
-    "with the pitch turned round, since the firmware counts it positive nose up; so is the pitch rate of "
-    "stateEstimateZ. Motors 1 to 4: front right, rear right, rear left, front left."
+    "World and body as the firmware has them: world z up, x taken to be along the approach; body x forward, y left, z "
+    "up; quaternion body to world. gyro in deg/s and acc in g as they are. Where only roll, pitch and yaw are logged, "
+    "the attitude is made of them with the pitch turned round, since the firmware counts it positive nose up; so is "
+    "the pitch rate of stateEstimateZ. Motors 1 to 4: front right, rear right, rear left, front left."
 )
 NOTES = ("Where the app says 0 for a distance, RREV or flow that it has not, nothing is stored.",)
 

@@ -14,6 +14,7 @@ from ivl.flight.formats import by_name
 from ivl.flight.log import Given, Log
 from ivl.flight.schema import SAMPLES
 from ivl.flight.store import Flight, Flights, Manifest
+from ivl.flight.table import read_bytes
 
 _SAME = 0.01
 """Two numbers for one thing may differ by this share: a log is rounded."""
@@ -106,7 +107,7 @@ def _digest(file: Path, sources: Sequence[Path]) -> dict[str, str]:
     """Name and digest of a file; one out of a folder that was named keeps the name of that folder."""
     folder = next((path for path in sources if path in file.parents), None)
     name = f"{folder.resolve().name}/{file.relative_to(folder)}" if folder else file.name
-    return {"file": name, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}
+    return {"file": name, "sha256": hashlib.sha256(read_bytes(file)).hexdigest()}
 
 
 def _absent(log: Log, flights: Sequence[Flight]) -> dict[str, str]:

@@ -16,7 +16,7 @@ from ivl.flight.log import GAP_S, Given, fresh_only
 from ivl.flight.phases import APPROACH, READY
 from ivl.flight.schema import POSE
 from ivl.flight.store import FloatArray
-from ivl.flight.table import IntArray, Rule, Table, samples, shorten
+from ivl.flight.table import IntArray, Rule, Table, is_folder, samples, shorten
 
 _SMOOTH = ("p_", "v_", "q_", "w_", "f_", "track_", "rotor_", "battery_")
 _STATE_S, _TRACK_S, _PERIODS = 0.25, 0.05, 3
@@ -73,11 +73,14 @@ def files_of(path: Path, suffixes: Sequence[str]) -> list[Path]:
     """The file itself, or the files of a folder in the order of their names.
 
     Raises:
-        ConfigError: The folder has none.
+        ConfigError: The folder has none, or cannot be read.
     """
-    if not path.is_dir():
+    if not is_folder(path):
         return [path]
-    files = sorted(file for file in path.iterdir() if file.suffix in suffixes and not file.name.startswith("."))
+    try:
+        files = sorted(file for file in path.iterdir() if file.suffix in suffixes and not file.name.startswith("."))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from error
     if not files:
         raise ConfigError(f"{path}: no {' or '.join(suffixes)} file in this folder")
     return files
@@ -223,7 +226,8 @@ def flights(merged: Merged) -> Iterator[IntArray]:
     """Rows of each flight, in the order flown.
 
     Rows without a whole pose (as far as the log has one) are left out. A flight ends with a pause of the clock, and
-    where the flight core begins its next landing: at READY, or without phases at a new policy.
+    where the flight core begins its next landing: at READY, or when it is back before a flip; without phases at a new
+    policy.
     """
     pose = [merged.columns[name] for name in POSE if name in merged.columns]
     rows = np.flatnonzero(np.isfinite(pose).all(axis=0)) if pose else np.arange(len(merged.t_s))
@@ -232,7 +236,8 @@ def flights(merged: Merged) -> Iterator[IntArray]:
     starts = np.diff(merged.t_s[rows]) > GAP_S
     phase = merged.columns.get("phase")
     if phase is not None:
-        starts |= (phase[rows][1:] == READY) & (phase[rows][:-1] != READY)
+        before, now = phase[rows][:-1], phase[rows][1:]
+        starts |= ((now == READY) & (before != READY)) | ((now <= APPROACH) & (before > APPROACH))
     elif "ivl.policy_seq" in merged.columns:
         policy = merged.columns["ivl.policy_seq"][rows]
         starts |= (np.diff(policy) != 0) & np.isfinite(np.diff(policy))

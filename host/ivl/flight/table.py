@@ -27,6 +27,8 @@ LIMITS = {
     "s": 1e11, "m": 1e4, "m/s": 1e4, "rad/s": 1e6, "m/s^2": 1e5, "1/s": 1e6, "N": 1e4, "N m": 1e4, "V": 1e4, "1": 1e6,
 }  # fmt: skip
 """Largest magnitude of a number by its unit. No vehicle comes near; a number beyond it is damage."""
+_HUGE = 1e30
+"""No number of any log is larger, whatever its unit."""
 _NORM_SLACK = 0.1
 _SHOWN = 40
 _NPZ_BYTES_MAX = 2**30
@@ -132,7 +134,7 @@ class Table:
         """
         values = self.columns[name]
         numbers = values.astype(np.float64) if isinstance(values, np.ndarray) else self._parse(name, values)
-        bad = np.isinf(numbers) | (np.isnan(numbers) & needed)
+        bad = ~(np.abs(numbers) <= _HUGE) & (needed | ~np.isnan(numbers))
         if bad.any():
             row = int(np.argmax(bad))
             cell = shorten(str(values[row]).strip())
@@ -157,13 +159,21 @@ def shorten(text: str, n: int = _SHOWN) -> str:
     return text if len(text) <= n else text[: n - 3] + "..."
 
 
+def is_folder(path: Path) -> bool:
+    """Whether this is a folder; what cannot be looked at is none."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
 def read_bytes(path: Path) -> bytes:
     """The content of a file.
 
     Raises:
         ConfigError: There is none, it is a folder, it cannot be read, or it is empty.
     """
-    if path.is_dir():
+    if is_folder(path):
         raise ConfigError(f"{path}: is a folder, this format reads files")
     try:
         data = path.read_bytes()

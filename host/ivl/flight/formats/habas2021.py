@@ -6,6 +6,7 @@ and in Error what went wrong. Rows "Flip Data" and "Impact Data" are snapshots t
 """
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +26,7 @@ _GRAM_N = 9.81e-3
 _MOMENT = 4 * 0.04 * math.sqrt(0.5) * _GRAM_N
 """N m per unit of Mx and My, which are gram-force added to each motor, at a lever of 40 mm cos 45 degrees."""
 _PERIOD_S = 0.01
-_N_SAMPLES_MIN, _CLIMB_MPS = 10, 0.7
+_N_SAMPLES_MIN, _CLIMB_MPS, _RREV_PER_S = 10, 0.7, 0.01
 _REWARD_PER_M = 10 / 2.10
 """Return per metre of the highest point; the rest of the return is for the feet."""
 _FEET_BY_REWARD = ((75.0, 4), (15.0, 2), (5.0, 1))
@@ -160,11 +161,12 @@ def _attempts(samples: Table, others: list[Table], order: list[tuple[int, int]],
         elif pieces and pieces[-1][0] == key:
             pieces.append((*pieces.pop()[:3], i))
         is_open = kind == 0
-    last = {key: n for n, (key, *_) in enumerate(pieces)}
+    total, seen = Counter(key for key, *_ in pieces), Counter[tuple[str, str]]()
     result = []
-    for n, (key, rows, summary, snapshot) in enumerate(pieces):
-        number = 1 + sum(before == key for before, *_ in pieces[:n])
-        result.append(_Attempt(key, number, last[key] == n, np.array(rows, dtype=np.intp), summary, snapshot))
+    for key, rows, summary, snapshot in pieces:
+        seen[key] += 1
+        last = seen[key] == total[key]
+        result.append(_Attempt(key, seen[key], last, np.array(rows, dtype=np.intp), summary, snapshot))
     return [attempt for attempt in result if len(attempt.rows)]
 
 
@@ -180,7 +182,8 @@ def _keys(table: Table) -> list[tuple[str, str]]:
 def _plane(samples: Table) -> float:
     """Height for which the vehicle computed RREV = v_z / d, m; NaN if too few samples tell."""
     z, vz, rrev = (samples.numbers(name) for name in ("z", "vz", "RREV"))
-    telling = (vz > _CLIMB_MPS) & (rrev > 0) & np.array([flag == "False" for flag in samples.text("flip_flag")])
+    before = np.array([flag == "False" for flag in samples.text("flip_flag")])
+    telling = (vz > _CLIMB_MPS) & (rrev > _RREV_PER_S) & before
     if telling.sum() < _N_SAMPLES_MIN:
         return float("nan")
     return round(float(np.median(z[telling] + vz[telling] / rrev[telling])), 3)
@@ -291,16 +294,19 @@ def _numbers(one: Table, name: str) -> list[float]:
     """A list as numpy prints it: "[3.72 6.05 0.  ]"."""
     text = one.text(name)[0]
     try:
-        return [float(word) for word in text.strip("[]").split()]
-    except ValueError as error:
-        raise one.fault(0, name, f"value '{border.shorten(text)}' is no list of numbers") from error
+        values = [float(word) for word in text.strip("[]").split()]
+    except ValueError:
+        values = [math.inf]
+    if any(math.isinf(value) for value in values):
+        raise one.fault(0, name, f"value '{border.shorten(text)}' is no list of numbers")
+    return values
 
 
 def _judge(flight: Flight, notes: list[str]) -> Flight:
     """Not usable: too short, or the vehicle's state stopped in the log while the vehicle moved."""
     info = dict(flight.info)
     if len(flight) < _N_SAMPLES_MIN:
-        notes.append(f"{len(flight)} samples")
+        notes.append(f"no more than {len(flight)} sample{'s' if len(flight) > 1 else ''}")
     stop_s = frozen_from(flight)
     if stop_s is not None:
         notes.append(f"the vehicle's state stands still from {stop_s:.2f} s on, while the tracking sees it move")

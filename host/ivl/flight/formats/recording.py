@@ -47,7 +47,7 @@ def load(paths: Sequence[Path], given: Given) -> Log:
     files: list[Path] = []
     notes: list[str] = []
     for path in paths:
-        if path.is_dir():
+        if border.is_folder(path):
             recordings = _recordings(path)
             flights += _run(path, recordings, given, notes)
             files += [path / "run.sqlite", *recordings]
@@ -135,6 +135,6 @@ def _journal(path: Path) -> dict[str, float]:
             entry = json.loads(line)
             if entry["what"] == "flown" and entry["battery_V"] is not None:
                 result[f"{int(entry['seed']):016x}-{int(entry['stream'])}"] = float(entry["battery_V"])
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
             raise ConfigError(f"{path}: line {number}: is no entry of a journal") from error
     return result

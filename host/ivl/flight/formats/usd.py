@@ -79,7 +79,9 @@ def tables(path: Path) -> list[tuple[str, Table, float]]:
         order, offsets = (np.array(part, dtype=np.intp) for part in starts[number])
         if len(offsets):
             records = raw[offsets[:, None] + np.arange(kind.dtype.itemsize)].reshape(-1).view(kind.dtype)
-            columns: dict[str, Values] = {n: records[n].astype(np.float64) for n in list(kind.dtype.fields or ())[1:]}
+            names = list(kind.dtype.fields or ())[1:]
+            with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN
+                columns: dict[str, Values] = {name: records[name].astype(np.float64) for name in names}
             result.append((kind.name, Table(path, columns, order, "event"), _TIME[version][1]))
     if not result:
         raise ConfigError(f"{path}: holds no event")
