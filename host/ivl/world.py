@@ -144,6 +144,25 @@ class World:
         sensing = f", sensing={self.sensing!r}" if self.sensing else ""
         return f"World(vehicle={self.vehicle!r}, gear={self.gear!r}, gear_set={self.gear_set!r}{sensing}{extra})"
 
+    def changed(self, **overrides: float) -> "World":
+        """The same world with parameters changed, made without reading its files again.
+
+        Args:
+            **overrides: Parameter values by dotted name, in the unit of the parameter table.
+
+        Raises:
+            ConfigError: An override is unknown or out of range.
+            NativeError: The library refuses the combination of values.
+        """
+        values, origin = dict(self.params.values), dict(self.params.origin)
+        for name, value in overrides.items():
+            values[name], origin[name] = model.check_override(name, value), "override"
+        world = object.__new__(World)
+        world.__dict__.update({k: v for k, v in self.__dict__.items() if k not in ("params", "_native")})
+        world.overrides = {**self.overrides, **overrides}
+        world._build(model.Parameters(values, origin))
+        return world
+
     @property
     def native_model(self) -> native.NativeModel:
         """The model inside the library."""

@@ -19,9 +19,7 @@ def world() -> World:
 
 def test_recorded_flip_is_flown_again_when_the_vehicle_is_the_same(world: World) -> None:
     flip = motion.flip(landing(world, 3.85, 6.0))
-    again = motion.fly(
-        motion.short_world(compare.world_of(flip, "crazyflie21", "wide_short", "table1", {}), QUIET), flip
-    )
+    again = motion.fly(motion.quiet_world(compare.in_room(world, flip)), flip)
     used = flip.compared()
     assert used.sum() > 80
     assert np.abs(again.pitch_deg - flip.pitch_deg)[used].max() < 1.0
@@ -39,8 +37,7 @@ def test_another_vehicle_shows_in_the_motion(world: World, name: str, value: flo
     flip = motion.flip(landing(world, 3.85, 6.0))
     errors = []
     for changes in ({}, {name: value}):
-        room = compare.world_of(flip, "crazyflie21", "wide_short", "table1", changes)
-        again = motion.fly(motion.short_world(room, {}), flip)
+        again = motion.fly(motion.quiet_world(compare.in_room(world.changed(**changes), flip)), flip)
         errors.append(np.sqrt(np.mean((getattr(again, signal) - getattr(flip, signal))[flip.compared()] ** 2)))
     assert errors[1] > 2.0 * errors[0]
 

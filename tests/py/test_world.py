@@ -119,7 +119,7 @@ def test_flown_start_reaches_the_approach_speed(world: ivl.World) -> None:
         ({"seed": -1}, "seed: value -1 must be a whole number"),
         ({"seed": 1.5}, "seed: value 1.5 must be a whole number"),
         ({"stream": [0, -2]}, "stream: value [0, -2] must be a whole number"),
-        ({"start": "thrown"}, "start: value 'thrown' is unknown (allowed imparted, flown, at_trigger)"),
+        ({"start": "thrown"}, "start: value 'thrown' is unknown (allowed imparted, flown, at_trigger, state)"),
         ({"start": "at_trigger"}, "d_ceil_m: value None"),
         ({"d_ceil_m": 0.5}, "d_ceil_m: value 0.5: start='at_trigger' needs it, others must not have it"),
         ({"threads": 0}, "threads: value 0 is out of range"),
@@ -198,3 +198,17 @@ def test_every_noisy_landing_comes_to_an_end(gear_set: str) -> None:
     out = world.rollouts(2.5, 90.0, rrev_c_per_s, moment_y_Nmm)
     ends = {world.end_reason(code) for code in np.unique(out.end_reason)}
     assert ends <= {"contact_time", "missed", "missed_time", "time_max"}
+
+
+def test_changed_world_equals_one_made_anew() -> None:
+    made = ivl.World("crazyflie21", "wide_long", "table1", None, **{"sense.latency": 0.02, "body.mass": 0.036})
+    changed = ivl.World("crazyflie21", "wide_long", "table1", None, **{"sense.latency": 0.005}).changed(
+        **{"sense.latency": 0.02, "body.mass": 0.036}
+    )
+    assert changed.params == made.params
+    assert changed.overrides == made.overrides
+    same = [world.rollouts(2.5, 70.0, np.linspace(3, 5, 20), 6.0, start="flown") for world in (made, changed)]
+    assert same[0].tobytes() == same[1].tobytes()
+    assert pickle.loads(pickle.dumps(changed)).params == made.params
+    with pytest.raises(ConfigError, match=r"out of range"):
+        made.changed(**{"sense.latency": 5.0})

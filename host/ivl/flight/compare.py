@@ -192,27 +192,24 @@ def compare(
         ConfigError: No flight can be compared, or a file is wrong.
     """
     found, left_out = flips(flights)
-    changes = dict(overrides or {})
+    home = World(vehicle, gear, gear_set, None, **(overrides or {}))
     rng = np.random.default_rng(seed)
     rows = []
     for number, flip in enumerate(found):
-        world = world_of(flip, vehicle, gear, gear_set, changes)
+        world = in_room(home, flip)
         rates = _predict(world, flip, n, rng, uncertainty or Uncertainty())
-        quiet = motion.short_world(world, {})
+        quiet = motion.quiet_world(world)
         rows.append(Row(flip, motion.fly(quiet, flip), rates, class_of(flip.n_legs)))
         if progress:
             progress(number + 1, len(found))
-    home = World(vehicle, gear, gear_set, None, **changes)
     windows = tuple(_window(home, group, moment) for moment, group in _groups(found))
     at_policies = tuple((rrev, moment, _rate(home, rrev, moment, 4 * _WINDOW_ROLLOUTS)) for rrev, moment in policies)
     return Comparison(tuple(rows), tuple(left_out), windows, at_policies)
 
 
-def world_of(flip: Flip, vehicle: str, gear: str, gear_set: str, overrides: dict[str, float]) -> World:
+def in_room(world: World, flip: Flip) -> World:
     """The vehicle in the room of the flight."""
-    there = World(vehicle, gear, gear_set, None, **overrides)
-    room = motion.site_overrides(flip, there.params.values["world.sensed_gap_offset"])
-    return World(vehicle, gear, gear_set, None, **{**overrides, **room})
+    return world.changed(**motion.site_overrides(flip, world.params.values["world.sensed_gap_offset"]))
 
 
 def motion_errors(pairs: Sequence[tuple[Flip, Simulated]]) -> dict[str, Any]:

@@ -10,7 +10,8 @@ Least squares over flights (scipy's trust-region method), with the values of the
 
 Samples of one flight are alike: its whole motion shifts with the trigger's jitter. Intervals therefore come from
 resampling whole flights, each time solved anew with the fit's own derivatives. What all flights share is drawn about
-itself instead: the prior, and the hanging height, which is as uncertain as the place of the tracked point in the body.
+itself instead: the prior, the hanging height, which is as uncertain as the place of the tracked point in the body, and
+the rotor speeds at the trigger, which a climb tells to 1 % or so: an error that all flights share is fitted along.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -35,6 +36,8 @@ _LEAST_SPREAD = {"pitch": 0.3, "rate": 0.1, "height": 0.001, "contact": 0.002}
 """Units: degrees, rad/s, m, s. A fit never claims to be better than the least."""
 _LOOKS = {"pitch": 3.0, "rate": 3.0, "height": 3.0, "contact": 1.0}
 """Independent looks that the samples of one flight are worth together."""
+_ROTOR_SIGMA, _FAR = 0.006, 10.0
+"""Common relative error of the rotor speeds at the trigger, which are read from the climb."""
 _CONTACT_FAR_S = 0.04
 _HANGING_SIGMA_M = 0.01
 """Of the tracked point above the centre of mass, twice: it hangs as far below as it flew above."""
@@ -194,20 +197,21 @@ class _Problem:
 
     def __init__(self, vehicle: str, gear: str, gear_set: str, held: dict[str, float], priors: dict[str, Prior],
                  flips: list[Flip]) -> None:  # fmt: skip
-        self._made = (vehicle, gear, gear_set)
+        self._home = World(vehicle, gear, gear_set, None, **held)
         self._held, self._priors, self._flips = held, priors, flips
         self._scale = np.array([prior.scale for prior in priors.values()])
         self._center = np.array([prior.value for prior in priors.values()])
+        self._n = len(priors)
 
     def values(self, x: FloatArray) -> FloatArray:
-        """Parameter values of x."""
-        return np.asarray(self._center + self._scale * x)
+        """Parameter values of x, whose last element is the common error of the rotor speeds; shape (..., n)."""
+        return np.asarray(self._center + self._scale * x[..., : self._n])
 
     def overrides(self, x: FloatArray) -> dict[str, float]:
         return {**self._held, **dict(zip(self._priors, map(float, self.values(x)), strict=True))}
 
     def world(self, flip: Flip, overrides: dict[str, float]) -> World:
-        return motion.short_world(compare.world_of(flip, *self._made, overrides), {})
+        return motion.quiet_world(compare.in_room(self._home.changed(**overrides), flip))
 
     def errors(self, flips: Sequence[Flip], overrides: dict[str, float]) -> dict[str, Any] | None:
         """Motion errors of flights; None without any."""
@@ -219,12 +223,13 @@ class _Problem:
     def raw(self, x: FloatArray) -> list[dict[str, FloatArray]]:
         """Residuals of each flight by kind, in their own units."""
         rooms = _Rooms(self, self.overrides(x))
-        return [_residuals(rooms.world(flip), flip) for flip in self._flips]
+        factor = 1.0 + _ROTOR_SIGMA * float(x[-1])
+        return [_residuals(rooms.world(flip), flip, factor) for flip in self._flips]
 
     def solve(self, progress: Callable[[str], None] | None) -> tuple[FloatArray, dict[str, float]]:
         """Alternate between the fit and the spread of its residuals."""
         spread = dict(_START_SPREAD)
-        x = np.zeros(len(self._priors))
+        x = np.zeros(self._n + 1)
         lo, hi = self._bounds()
         for number in range(_ROUNDS):
             weights = dict(spread)
@@ -252,11 +257,12 @@ class _Problem:
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
         lo = np.array([p.lo for p in self._priors.values()])
         hi = np.array([p.hi for p in self._priors.values()])
-        return (lo - self._center) / self._scale, (hi - self._center) / self._scale
+        ends = (lo - self._center) / self._scale, (hi - self._center) / self._scale
+        return np.append(ends[0], -_FAR), np.append(ends[1], _FAR)
 
     def shared(self, x: FloatArray) -> FloatArray:
         """What is not of a single flight, in standard deviations: distance from the prior, hanging height."""
-        known = np.array([np.isfinite(prior.sigma) for prior in self._priors.values()])
+        known = np.array([np.isfinite(prior.sigma) for prior in self._priors.values()] + [True])
         rooms = _Rooms(self, self.overrides(x))
         hanging = [rooms.hanging_m(flip) - flip.hanging_m for flip in self._flips if np.isfinite(flip.hanging_m)]
         height = [float(np.median(hanging)) / _HANGING_SIGMA_M] if hanging else []
@@ -296,7 +302,7 @@ class _Problem:
             right = right + shared_slope.T @ (shared + rng.normal(size=len(shared)))
             drawn.append(x - np.linalg.lstsq(matrix, right, rcond=None)[0])
         lo, hi = self._bounds()
-        spread = self.values(np.clip(np.array(drawn), lo, hi))
+        spread = self.values(np.clip(np.array(drawn), lo, hi))  # the common error of the rotors is in it
         covariance = np.atleast_2d(np.cov(spread.T)) * n / max(n - 1, 1)
         return self.values(x), spread, covariance
 
@@ -323,9 +329,9 @@ class _Rooms:
         return values["world.ceiling_height"] - down_m - values["leg.foot_radius"]
 
 
-def _residuals(world: World, flip: Flip) -> dict[str, FloatArray]:
+def _residuals(world: World, flip: Flip, rotor_factor: float) -> dict[str, FloatArray]:
     """Simulated minus recorded, by kind."""
-    simulated = motion.fly(world, flip)
+    simulated = motion.fly(world, flip, motion.start_state(world, flip, rotor_factor))
     used = flip.compared()
     rate = motion.clip_rate(simulated.rate_radps)
     parts = {

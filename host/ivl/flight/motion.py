@@ -9,7 +9,6 @@ trigger fires when a pose arrives, so that one is `sense.latency` old. Time runs
     np.sqrt(np.mean((simulated.pitch_deg - flip.pitch_deg) ** 2))
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +22,7 @@ MOTION_S = 0.2
 """Motion is compared up to this long after the trigger, or to the contact."""
 _BEFORE_S, _THRUST_S = 0.1, 0.03
 GRAVITY_MPS2 = 9.81
-_SETTLED_S = (0.5, 1.0)
+_SETTLED_S = (0.8, 1.3)
 _CONTACT_AFTER_S, _CONTACT_RATE_RADPS, _CONTACT_DROP_RADPS = 0.06, 8.0, 1.5
 _CONTACT_WINDOW_S = 0.01
 _CLIP_SHARE = 0.93
@@ -47,6 +46,7 @@ class Flip:
         state: State at the trigger as the vehicle sensed it; rotor speeds unknown, battery without load if known.
         climb_mps2: Vertical acceleration before the trigger.
         climb_age_s: How long before the trigger that was, on average.
+        climb_is_sensed: True: from the velocity of the state estimate, which is late; False: from the accelerometer.
         t_s: Times of the samples after the trigger that are no repeats, shape (n,).
         pitch_deg: Nose-up rotation, unwrapped, shape (n,).
         rate_radps: Nose-up rate, shape (n,).
@@ -65,6 +65,7 @@ class Flip:
     state: State
     climb_mps2: float
     climb_age_s: float
+    climb_is_sensed: bool
     t_s: FloatArray
     pitch_deg: FloatArray
     rate_radps: FloatArray
@@ -106,7 +107,7 @@ def flip(flight: Flight) -> Flip:
     after = fresh & (t_s > 0)
     if before.sum() < 3 or after.sum() < 5:
         raise ConfigError(f"flight {flight.label}: too few samples around the trigger")
-    climb, climb_age_s = _climb(flight, t_s, before)
+    climb, climb_age_s, climb_is_sensed = _climb(flight, t_s, before)
     state = State(
         p_W_m=flight.stack("p", "xyz", "m")[at],
         v_W_mps=flight.stack("v", "xyz", "mps")[at],
@@ -126,6 +127,7 @@ def flip(flight: Flight) -> Flip:
         state=state,
         climb_mps2=climb,
         climb_age_s=climb_age_s,
+        climb_is_sensed=climb_is_sensed,
         t_s=t_s[after],
         pitch_deg=pitch[after],
         rate_radps=rate[after],
@@ -148,8 +150,14 @@ def site_overrides(flip: Flip, gap_offset_m: float) -> dict[str, float]:
     return {"world.ceiling_height": surface_m, "world.sensed_gap_offset": flip.h_plane_m - surface_m}
 
 
-def start_state(world: World, flip: Flip) -> State:
-    """The true state at the trigger: what was sensed, `sense.latency` later; rotors that give the recorded climb."""
+def start_state(world: World, flip: Flip, rotor_factor: float = 1.0) -> State:
+    """The true state at the trigger: what was sensed, `sense.latency` later; rotors that give the recorded climb.
+
+    Args:
+        world: The vehicle, in the room of the flight.
+        flip: The recorded flip.
+        rotor_factor: On the rotor speeds, since a climb tells them to 1 % or so.
+    """
     values = world.params.values
     lag_s = values["sense.latency"]
     climb = _present_climb(world, flip)
@@ -160,7 +168,8 @@ def start_state(world: World, flip: Flip) -> State:
     air = max(1.0 - values["rotor.inflow_loss"] * max(climb_rate, 0.0), 0.1)
     most = world.derived()["rotor_speed_max_radps"]
     speed = float(np.sqrt(max(force_N, 0.0) / (4.0 * values["rotor.thrust_constant"] * air)))
-    return replace(flip.state, p_W_m=p_W_m, v_W_mps=v_W_mps, rotor_radps=np.full(4, min(speed, most)))
+    rotors = np.full(4, min(rotor_factor * speed, most))
+    return replace(flip.state, p_W_m=p_W_m, v_W_mps=v_W_mps, rotor_radps=rotors)
 
 
 def _present_climb(world: World, flip: Flip) -> float:
@@ -169,7 +178,13 @@ def _present_climb(world: World, flip: Flip) -> float:
     mass_kg = world.derived()["mass_total_kg"]
     thrust_N = mass_kg * (values["world.gravity"] + flip.climb_mps2)
     rate_per_s = (values["aero.drag_z"] + values["rotor.inflow_loss"] * thrust_N) / mass_kg
-    return flip.climb_mps2 * float(np.exp(-rate_per_s * flip.climb_age_s))
+    age_s = flip.climb_age_s + (sensing_lag(world) if flip.climb_is_sensed else 0.0)
+    return flip.climb_mps2 * float(np.exp(-rate_per_s * age_s))
+
+
+def sensing_lag(world: World) -> float:
+    """How late position and velocity are on average, a pose being held until the next one arrives."""
+    return world.params.values["sense.latency"] + 0.5 / world.params.values["sense.pose_rate"]
 
 
 def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> Simulated:
@@ -186,7 +201,7 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
                         period_s=_TRACE_PERIOD_S)  # fmt: skip
     rows = trace.rows
     values = world.params.values
-    lag_s = values["sense.latency"] + 0.5 / values["sense.pose_rate"]
+    lag_s = sensing_lag(world)
     gyro_max = min(values["sense.gyro_max"], _GYRO_DEFAULT_RADPS)
     rate = -np.clip(rows.w_B_radps[:, 1], -gyro_max, gyro_max)
     turned = np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(rows.t_s))))
@@ -202,11 +217,9 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
     )
 
 
-def short_world(world: World, overrides: Mapping[str, float]) -> World:
-    """The same world without noise, changed as `overrides` say, whose landings end soon after the contact."""
-    quiet = {name: 0.0 for name in _SCATTER if world.params.values[name] > 0.0}
-    changes = {**world.overrides, **quiet, **_SHORT_END, **overrides}
-    return World(world.vehicle, world.gear, world.gear_set, world.sensing, **changes)
+def quiet_world(world: World) -> World:
+    """The same world without scatter, whose landings end soon after the contact."""
+    return world.changed(**dict.fromkeys(_SCATTER, 0.0), **_SHORT_END)
 
 
 _SCATTER = ("sense.position_noise", "sense.velocity_noise", "rotor.thrust_scatter", "battery.voltage_scatter",
@@ -230,8 +243,10 @@ def pitch_deg(q_WB: FloatArray) -> FloatArray:
     return np.asarray(np.degrees(np.unwrap(np.arctan2(nose_z, up_z))))
 
 
-def _climb(flight: Flight, t_s: FloatArray, before: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[float, float]:
-    """Vertical acceleration before the trigger, and its age: from the accelerometer, else from the slope of the climb.
+def _climb(
+    flight: Flight, t_s: FloatArray, before: np.ndarray[tuple[int], np.dtype[np.bool_]]
+) -> tuple[float, float, bool]:
+    """Vertical acceleration before the trigger, its age, and whether it had to be read from the sensed velocity.
 
     It gives the thrust, on which the flip depends much: 1 % of rotor speed turns it by 5 degrees in 200 ms.
     """
@@ -240,8 +255,8 @@ def _climb(flight: Flight, t_s: FloatArray, before: np.ndarray[tuple[int], np.dt
     if len(force) and np.isfinite(force).all():
         x, y, z, w = flight.stack("q", "xyzw")[last].T
         up = np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
-        return float(np.mean(np.sum(up * force, axis=1))) - GRAVITY_MPS2, -float(np.mean(t_s[last]))
-    return float(np.polyfit(t_s[before], flight["v_z_mps"][before], 1)[0]), -float(np.mean(t_s[before]))
+        return float(np.mean(np.sum(up * force, axis=1))) - GRAVITY_MPS2, -float(np.mean(t_s[last])), False
+    return float(np.polyfit(t_s[before], flight["v_z_mps"][before], 1)[0]), -float(np.mean(t_s[before])), True
 
 
 def contact_time(t_s: FloatArray, rate_radps: FloatArray, window_s: float) -> float:

@@ -9,6 +9,7 @@ from rich.progress import Progress
 from ivl.cli import console
 from ivl.cli.flight import options
 from ivl.errors import ConfigError
+from ivl.world import World
 
 HELP = """Compare recorded flights with the simulation of a vehicle.
 
@@ -69,7 +70,9 @@ def compare(
 def _draw(library: Any, result: Any, made: tuple[str, str, str], changes: dict[str, float], path: Path) -> None:
     from ivl.plots import flights as picture  # matplotlib takes a second to load
 
-    worlds = [library.world_of(row.flip, *made, changes) for row in result.rows]
+    vehicle, gear, gear_set = made
+    home = World(vehicle, gear, gear_set, None, **changes)
+    worlds = [library.in_room(home, row.flip) for row in result.rows]
     picture.draw(result, worlds, [path], f"{made[0]}, {made[2]}/{made[1]}")
 
 
