@@ -219,7 +219,7 @@ def motion_errors(pairs: Sequence[tuple[Flip, Simulated]]) -> dict[str, Any]:
     for flip, simulated in pairs:
         used = flip.compared()
         errors["pitch"].append((simulated.pitch_deg - flip.pitch_deg)[used])
-        errors["height"].append((simulated.height_m - flip.height_m)[used])
+        errors["height"].append((simulated.height_m - flip.height_m)[used & flip.is_new_pose])
         rates = motion.clip_rate(simulated.rate_radps) - motion.clip_rate(flip.rate_radps)
         errors["rate"].append(rates[used])
         contacts.append(simulated.t_contact_s - flip.t_contact_s)

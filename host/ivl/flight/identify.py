@@ -29,6 +29,8 @@ from ivl.flight.motion import Flip
 from ivl.flight.store import Flights, FloatArray
 from ivl.world import World
 
+Spread = dict[str, float]
+
 KINDS = ("pitch", "rate", "height", "contact")
 """Kinds of residuals, in the order of the residual vector of a flight."""
 _START_SPREAD = {"pitch": 4.0, "rate": 1.0, "height": 0.01, "contact": 0.006}
@@ -38,9 +40,11 @@ _LOOKS = {"pitch": 3.0, "rate": 3.0, "height": 3.0, "contact": 1.0}
 """Independent looks that the samples of one flight are worth together."""
 _ROTOR_SIGMA, _FAR = 0.006, 10.0
 """Common relative error of the rotor speeds at the trigger, which are read from the climb."""
+_PITCH_GROWTH_DEG, _RATE_GROWTH_RADPS = 20.0, 5.0
 _CONTACT_FAR_S = 0.04
 _HANGING_SIGMA_M = 0.01
 """Of the tracked point above the centre of mass, twice: it hangs as far below as it flew above."""
+_STARTS, _FITTED_STARTS = 24, 3
 _ROUNDS, _EVALUATIONS, _SETTLED = 6, 20, 0.05
 _STEP = 0.02
 """For derivatives, in units of the prior's spread: motion is smooth, the time of a contact is not."""
@@ -175,9 +179,10 @@ def identify(
     if not used:
         raise ConfigError("no flight is left to fit: every one is held out")
     problem = _Problem(vehicle, gear, gear_set, held, dict(zip(names, priors, strict=True)), used)
-    x, spread = problem.solve(progress)
+    rng = np.random.default_rng(seed)
+    x, spread = problem.solve(rng, progress)
     at, blocks = problem.derivatives(x, spread)
-    values, draws, covariance = problem.resample(x, at, blocks, np.random.default_rng(seed))
+    values, draws, covariance = problem.resample(x, at, blocks, rng)
     sigma = np.sqrt(np.diag(covariance))
     reach = float(stats.t.ppf(0.975, max(len(used) - 1, 1))) * sigma  # few flights tell their own spread badly
     estimates = tuple(
@@ -226,33 +231,56 @@ class _Problem:
         factor = 1.0 + _ROTOR_SIGMA * float(x[-1])
         return [_residuals(rooms.world(flip), flip, factor) for flip in self._flips]
 
-    def solve(self, progress: Callable[[str], None] | None) -> tuple[FloatArray, dict[str, float]]:
+    def solve(self, rng: np.random.Generator, progress: Callable[[str], None] | None) -> tuple[FloatArray, Spread]:
         """Alternate between the fit and the spread of its residuals."""
         spread = dict(_START_SPREAD)
-        x = np.zeros(self._n + 1)
-        lo, hi = self._bounds()
+        x = self._best_start(rng, spread)
         for number in range(_ROUNDS):
-            weights = dict(spread)
-            result = least_squares(
-                lambda x, w=weights: np.concatenate([*_weighted(self.raw(x), w), self.shared(x)]),
-                np.clip(x, lo + 1e-9, hi - 1e-9),
-                jac=lambda x, w=weights: np.concatenate([*self.derivatives(x, w)[1], self._shared_slope(x)]),
-                bounds=(lo, hi),
-                x_scale="jac",
-                loss="soft_l1",
-                max_nfev=_EVALUATIONS,
-                ftol=1e-4,
-                xtol=1e-3,
-            )
-            moved = float(np.abs(result.x - x).max())
-            x = np.asarray(result.x)
+            before, x = x, self._fit(x, spread)
             spread = _spread(self.raw(x))
             if progress:
                 named = ", ".join(f"{n} {v:.4g}" for n, v in zip(self._priors, self.values(x), strict=True))
-                progress(f"round {number + 1}: {named}; pitch {spread['pitch']:.1f} deg")
-            if moved < _SETTLED:
+                progress(f"round {number + 1}: {named}")
+            if np.abs(x - before).max() < _SETTLED:
                 break
         return x, spread
+
+    def _best_start(self, rng: np.random.Generator, spread: Spread) -> FloatArray:
+        """The best of a few fits from points drawn from the prior: contacts make valleys of their own."""
+        lo, hi = self._bounds()
+        drawn = np.clip(rng.normal(size=(_STARTS, self._n + 1)), lo, hi)
+        drawn[:, -1] = 0.0
+        drawn[0] = 0.0
+        ranked = sorted(drawn, key=lambda x: self._cost(x, spread))
+        return min((self._fit(x, spread) for x in ranked[:_FITTED_STARTS]), key=lambda x: self._cost(x, spread))
+
+    def _cost(self, x: FloatArray, spread: Spread) -> float:
+        return 0.5 * float(np.sum(self._residuals(x, spread) ** 2))
+
+    def _residuals(self, x: FloatArray, spread: Spread) -> FloatArray:
+        """Those of flights through the robust loss; what they share as it is."""
+        return np.concatenate([_robust(np.concatenate(_weighted(self.raw(x), spread))), self.shared(x)])
+
+    def _jacobian(self, x: FloatArray, spread: Spread) -> FloatArray:
+        here, blocks = self.derivatives(x, spread)
+        r = np.concatenate(here)
+        bent = _robust(r)
+        slope = np.where(np.abs(r) < 1e-6, 1.0, r / (np.sqrt(1.0 + r**2) * np.where(bent == 0.0, 1.0, bent)))
+        return np.concatenate([slope[:, None] * np.concatenate(blocks), self._shared_slope(x)])
+
+    def _fit(self, x: FloatArray, spread: Spread) -> FloatArray:
+        lo, hi = self._bounds()
+        result = least_squares(
+            lambda x: self._residuals(x, spread),
+            np.clip(x, lo + 1e-9, hi - 1e-9),
+            jac=lambda x: self._jacobian(x, spread),
+            bounds=(lo, hi),
+            x_scale="jac",
+            max_nfev=_EVALUATIONS,
+            ftol=1e-4,
+            xtol=1e-3,
+        )
+        return np.asarray(result.x)
 
     def _bounds(self) -> tuple[FloatArray, FloatArray]:
         lo = np.array([p.lo for p in self._priors.values()])
@@ -269,29 +297,34 @@ class _Problem:
         return np.concatenate([np.where(known, x, 0.0), height])
 
     def _shared_slope(self, x: FloatArray) -> FloatArray:
+        sides = enumerate(self._sides(x))
+        return np.stack(
+            [(self.shared(high) - self.shared(low)) / (high[i] - low[i]) for i, (low, high) in sides], axis=1
+        )
+
+    def _sides(self, x: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Points below and above x along each parameter, within the bounds."""
+        lo, hi = self._bounds()
         steps = _STEP * np.eye(len(x))
-        return np.stack([(self.shared(x + step) - self.shared(x - step)) / (2 * _STEP) for step in steps], axis=1)
+        return [(np.maximum(x - step, lo), np.minimum(x + step, hi)) for step in steps]
 
     def derivatives(self, x: FloatArray, spread: Mapping[str, float]) -> tuple[list[FloatArray], list[FloatArray]]:
         """Weighted residuals of each flight, and their derivatives, shape (n_residuals, n_parameters)."""
         here = _weighted(self.raw(x), spread)
         blocks = [np.zeros((len(r), len(x))) for r in here]
-        for i in range(len(x)):
-            step = np.zeros(len(x))
-            step[i] = _STEP
-            above, below = (_weighted(self.raw(x + sign * step), spread) for sign in (1.0, -1.0))
+        for i, (low, high) in enumerate(self._sides(x)):
+            above, below = _weighted(self.raw(high), spread), _weighted(self.raw(low), spread)
             for block, a, b in zip(blocks, above, below, strict=True):
-                block[:, i] = np.clip((a - b) / (2.0 * step[i]), -50.0, 50.0)
+                block[:, i] = np.clip((a - b) / (high[i] - low[i]), -50.0, 50.0)
         return here, blocks
 
     def resample(
         self, x: FloatArray, at: list[FloatArray], blocks: list[FloatArray], rng: np.random.Generator
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Values, resampled values, covariance: flights are drawn anew, what they share is drawn about itself."""
-        # the weights of the fit's robust loss: a flight whose log slipped counts little here as well
-        weights = [1.0 / np.sqrt(1.0 + residual**2) for residual in at]
-        normal = [block.T @ (w[:, None] * block) for block, w in zip(blocks, weights, strict=True)]
-        slope = [block.T @ (w * residual) for block, w, residual in zip(blocks, weights, at, strict=True)]
+        # first and second derivative of the robust loss: a flight whose log slipped counts little here as well
+        normal = [block.T @ (block / (1.0 + r[:, None] ** 2) ** 1.5) for block, r in zip(blocks, at, strict=True)]
+        slope = [block.T @ (r / np.sqrt(1.0 + r**2)) for block, r in zip(blocks, at, strict=True)]
         shared, shared_slope = self.shared(x), self._shared_slope(x)
         n = len(blocks)
         drawn = []
@@ -303,7 +336,8 @@ class _Problem:
             drawn.append(x - np.linalg.lstsq(matrix, right, rcond=None)[0])
         lo, hi = self._bounds()
         spread = self.values(np.clip(np.array(drawn), lo, hi))  # the common error of the rotors is in it
-        covariance = np.atleast_2d(np.cov(spread.T)) * n / max(n - 1, 1)
+        # the fit has taken as many looks from the flights as it has parameters: what is left looks too good
+        covariance = np.atleast_2d(np.cov(spread.T)) * n / max(n - len(x), 1)
         return self.values(x), spread, covariance
 
 
@@ -333,14 +367,20 @@ def _residuals(world: World, flip: Flip, rotor_factor: float) -> dict[str, Float
     """Simulated minus recorded, by kind."""
     simulated = motion.fly(world, flip, motion.start_state(world, flip, rotor_factor))
     used = flip.compared()
-    rate = motion.clip_rate(simulated.rate_radps)
+    rate, recorded_rate = motion.clip_rate(simulated.rate_radps), motion.clip_rate(flip.rate_radps)
+    # what is wrong with a flip grows as it turns: pitch and rate are held against their own size
     parts = {
-        "pitch": (simulated.pitch_deg - flip.pitch_deg)[used],
-        "rate": (rate - motion.clip_rate(flip.rate_radps))[used],
-        "height": (simulated.height_m - flip.height_m)[used],
+        "pitch": ((simulated.pitch_deg - flip.pitch_deg) / (1.0 + np.abs(flip.pitch_deg) / _PITCH_GROWTH_DEG))[used],
+        "rate": ((rate - recorded_rate) / (1.0 + np.abs(recorded_rate) / _RATE_GROWTH_RADPS))[used],
+        "height": (simulated.height_m - flip.height_m)[used & flip.is_new_pose],
     }
     parts["contact"] = np.array([_contact_error(simulated.t_contact_s, flip.t_contact_s)])
     return parts
+
+
+def _robust(residual: FloatArray) -> FloatArray:
+    """Residuals whose squares make the loss 2 (sqrt(1 + r^2) - 1): linear where a flight is far off."""
+    return np.asarray(np.sign(residual) * np.sqrt(2.0 * (np.sqrt(1.0 + residual**2) - 1.0)))
 
 
 def _contact_error(simulated_s: float, recorded_s: float) -> float:

@@ -1,8 +1,8 @@
 """The flip as it was recorded, and the same flip flown by the simulator.
 
 Both sides are what the vehicle itself would log: attitude and rate from the gyro, clipped where the gyro clips; height
-and climb as the state estimate gives them, late by `sense.latency` and by half a period for which a pose is held. The
-trigger fires when a pose arrives, so that one is `sense.latency` old. Time runs from the trigger.
+as the state estimate gives it, late by `sense.latency`, where a new pose has come. The trigger fires when a pose comes.
+Time runs from the trigger.
 
     flip = motion.flip(flight)
     simulated = motion.fly(world, flip)
@@ -12,11 +12,14 @@ trigger fires when a pose arrives, so that one is `sense.latency` old. Time runs
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from ivl.errors import ConfigError
 from ivl.flight.schema import POSE
 from ivl.flight.store import Flight, FloatArray
 from ivl.world import State, Trace, World
+
+BoolArray = npt.NDArray[np.bool_]
 
 MOTION_S = 0.2
 """Motion is compared up to this long after the trigger, or to the contact."""
@@ -51,7 +54,7 @@ class Flip:
         pitch_deg: Nose-up rotation, unwrapped, shape (n,).
         rate_radps: Nose-up rate, shape (n,).
         height_m: Sensed height, shape (n,).
-        climb_rate_mps: Sensed vertical velocity, shape (n,).
+        is_new_pose: True where a new pose had come since the sample before, shape (n,).
         t_contact_s: First sharp fall of the rate, NaN if there is none.
         hanging_m: Height at which it hangs at the end, inverted and still; NaN if it does not.
         n_legs: Feet at the end as judged, NaN if nobody did.
@@ -70,12 +73,12 @@ class Flip:
     pitch_deg: FloatArray
     rate_radps: FloatArray
     height_m: FloatArray
-    climb_rate_mps: FloatArray
+    is_new_pose: BoolArray
     t_contact_s: float
     hanging_m: float
     n_legs: float
 
-    def compared(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def compared(self) -> BoolArray:
         """Samples of the free rotation: up to `MOTION_S` and before the recorded contact."""
         end_s = min(MOTION_S, self.t_contact_s) if np.isfinite(self.t_contact_s) else MOTION_S
         return np.asarray((self.t_s > 0) & (self.t_s <= end_s))
@@ -88,7 +91,6 @@ class Simulated:
     pitch_deg: FloatArray
     rate_radps: FloatArray
     height_m: FloatArray
-    climb_rate_mps: FloatArray
     t_contact_s: float
     trace: Trace
 
@@ -132,7 +134,7 @@ def flip(flight: Flight) -> Flip:
         pitch_deg=pitch[after],
         rate_radps=rate[after],
         height_m=flight["p_z_m"][after],
-        climb_rate_mps=flight["v_z_mps"][after],
+        is_new_pose=_new_pose(flight)[after],
         t_contact_s=contact_time(t_s[after], rate[after], _window(t_s[after])),
         hanging_m=_hanging(flight, pitch),
         n_legs=float(flight.info["n_legs"]),
@@ -201,7 +203,8 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
                         period_s=_TRACE_PERIOD_S)  # fmt: skip
     rows = trace.rows
     values = world.params.values
-    lag_s = sensing_lag(world)
+    # a sample shows a pose that came within the period before it
+    lag_s = values["sense.latency"] + 0.5 * float(np.median(np.diff(flip.t_s)))
     gyro_max = min(values["sense.gyro_max"], _GYRO_DEFAULT_RADPS)
     rate = -np.clip(rows.w_B_radps[:, 1], -gyro_max, gyro_max)
     turned = np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(rows.t_s))))
@@ -211,7 +214,6 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
         pitch_deg=np.interp(flip.t_s, rows.t_s, pitch),
         rate_radps=sampled,
         height_m=_late(flip, rows.t_s, rows.p_WB_m[:, 2], lag_s),
-        climb_rate_mps=_late(flip, rows.t_s, rows.v_WB_mps[:, 2], lag_s),
         t_contact_s=contact_time(rows.t_s, rate, _window(flip.t_s)),
         trace=trace,
     )
@@ -243,9 +245,7 @@ def pitch_deg(q_WB: FloatArray) -> FloatArray:
     return np.asarray(np.degrees(np.unwrap(np.arctan2(nose_z, up_z))))
 
 
-def _climb(
-    flight: Flight, t_s: FloatArray, before: np.ndarray[tuple[int], np.dtype[np.bool_]]
-) -> tuple[float, float, bool]:
+def _climb(flight: Flight, t_s: FloatArray, before: BoolArray) -> tuple[float, float, bool]:
     """Vertical acceleration before the trigger, its age, and whether it had to be read from the sensed velocity.
 
     It gives the thrust, on which the flip depends much: 1 % of rotor speed turns it by 5 degrees in 200 ms.
@@ -298,11 +298,16 @@ def _check(flight: Flight) -> None:
         raise ConfigError(f"flight {flight.label}: column {missing} is not in the log")
 
 
-def _fresh(flight: Flight) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _fresh(flight: Flight) -> BoolArray:
     """Samples that differ from the one before: a log repeats its last value while nothing new has come."""
     pose = np.stack([flight[name] for name in POSE], axis=1)
     changed = (np.diff(pose, axis=0) != 0.0).any(axis=1)
     return np.concatenate(([True], changed)) & np.isfinite(pose).all(axis=1)
+
+
+def _new_pose(flight: Flight) -> BoolArray:
+    moved = np.diff(flight.stack("p", "xyz", "m"), axis=0) != 0.0
+    return np.concatenate(([True], moved.any(axis=1)))
 
 
 def _unit(q_WB: FloatArray) -> FloatArray:
