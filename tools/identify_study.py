@@ -15,7 +15,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from ivl import experiment, model
 from ivl.flight import identify, importer
@@ -51,16 +50,10 @@ def record(folder: Path, source: CrazyflieSource, n_flights: int, seed: int) -> 
 
 def wrong_vehicle(folder: Path, vehicle: str) -> Path:
     """The vehicle's file with three numbers wrong."""
-    part = model.load_vehicle(vehicle)
-    groups: dict[str, dict] = {}
-    for name, quantity in part.quantities.items():
-        group, _, key = name.partition(".")
-        value = identify.replace_quantity(quantity, None, "")
-        if name in WRONG:
-            value |= {"value": quantity.value + WRONG[name], "sigma": WRONG[name], "source": "wrong on purpose"}
-        groups.setdefault(group, {})[key] = value
+    values = model.load_vehicle(vehicle).quantities
     path = folder / "wrong.yaml"
-    path.write_text(yaml.safe_dump({"name": "wrong", "doc": "Three numbers are wrong.", **groups}), encoding="utf-8")
+    wrong = {name: values[name].value + error for name, error in WRONG.items()}
+    path.write_text(identify.vehicle_text(vehicle, wrong, WRONG), encoding="utf-8")
     return path
 
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import yaml
 from scipy import stats  # type: ignore[import-untyped]
 from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
@@ -38,6 +39,8 @@ _LEAST_SPREAD = {"pitch": 0.3, "rate": 0.1, "height": 0.001, "contact": 0.002}
 """Units: degrees, rad/s, m, s. A fit never claims to be better than the least."""
 _LOOKS = {"pitch": 3.0, "rate": 3.0, "height": 3.0, "contact": 1.0}
 """Independent looks that the samples of one flight are worth together."""
+_FACTOR = 20.0
+"""No parameter is sought further from its prior than this factor; one that is 0 anywhere in its range."""
 _ROTOR_SIGMA, _FAR = 0.006, 10.0
 """Common relative error of the rotor speeds at the trigger, which are read from the climb."""
 _PITCH_GROWTH_DEG, _RATE_GROWTH_RADPS = 20.0, 5.0
@@ -213,7 +216,8 @@ class _Problem:
         return np.asarray(self._center + self._scale * x[..., : self._n])
 
     def overrides(self, x: FloatArray) -> dict[str, float]:
-        return {**self._held, **dict(zip(self._priors, map(float, self.values(x)), strict=True))}
+        values = zip(self._priors.items(), self.values(x), strict=True)
+        return {**self._held, **{name: float(np.clip(v, prior.lo, prior.hi)) for (name, prior), v in values}}
 
     def world(self, flip: Flip, overrides: dict[str, float]) -> World:
         return motion.quiet_world(compare.in_room(self._home.changed(**overrides), flip))
@@ -248,7 +252,7 @@ class _Problem:
     def _best_start(self, rng: np.random.Generator, spread: Spread) -> FloatArray:
         """The best of a few fits from points drawn from the prior: contacts make valleys of their own."""
         lo, hi = self._bounds()
-        drawn = np.clip(rng.normal(size=(_STARTS, self._n + 1)), lo, hi)
+        drawn = np.clip(rng.uniform(-1.5, 1.5, (_STARTS, self._n + 1)), 0.8 * lo, 0.8 * hi)
         drawn[:, -1] = 0.0
         drawn[0] = 0.0
         ranked = sorted(drawn, key=lambda x: self._cost(x, spread))
@@ -429,7 +433,8 @@ def _priors(vehicle: str, names: Sequence[str], held: Mapping[str, float], sigma
         sigma = sigmas.get(name, quantity.sigma if quantity and quantity.sigma else float("inf"))
         if not sigma > 0.0:
             raise ConfigError(f"--sigma: {name}: value {sigma!r} (allowed: above 0)")
-        priors.append(Prior(value, sigma, field.lo, min(field.hi, 1e6)))
+        lo, hi = (field.lo, field.hi) if value == 0.0 else sorted((value / _FACTOR, value * _FACTOR))
+        priors.append(Prior(value, sigma, max(lo, field.lo), min(hi, field.hi, 1e6)))
     if len(set(names)) != len(names):
         raise ConfigError("--fit: a parameter is named twice")
     return priors
@@ -475,6 +480,19 @@ def vehicle_file(vehicle: str, result: Identification, source: str) -> dict[str,
         groups.setdefault(group, {})[key] = quantity
     doc = f"{part.doc} Identified from {len(result.used)} recorded flights: {', '.join(fitted)}."
     return {"name": f"{part.name}_identified", "doc": doc, **groups}
+
+
+def vehicle_text(vehicle: str, values: Mapping[str, float], sigmas: Mapping[str, float]) -> str:
+    """A vehicle file with other values and standard deviations, to see what flights make of them."""
+    part = model.load_vehicle(vehicle)
+    groups: dict[str, dict[str, Any]] = {}
+    for name, quantity in part.quantities.items():
+        group, _, key = name.partition(".")
+        told = replace_quantity(quantity, None, "")
+        if name in values:
+            told |= {"value": values[name], "sigma": sigmas[name], "source": "set aside, to be identified"}
+        groups.setdefault(group, {})[key] = told
+    return yaml.safe_dump({"name": f"{part.name}_off", "doc": part.doc, **groups}, sort_keys=False)
 
 
 def replace_quantity(quantity: model.Quantity, estimate: Estimate | None, source: str) -> dict[str, Any]:

@@ -221,10 +221,10 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
 
 def quiet_world(world: World) -> World:
     """The same world without scatter, whose landings end soon after the contact."""
-    return world.changed(**dict.fromkeys(_SCATTER, 0.0), **_SHORT_END)
+    return world.changed(**dict.fromkeys(SCATTER, 0.0), **_SHORT_END)
 
 
-_SCATTER = ("sense.position_noise", "sense.velocity_noise", "rotor.thrust_scatter", "battery.voltage_scatter",
+SCATTER = ("sense.position_noise", "sense.velocity_noise", "rotor.thrust_scatter", "battery.voltage_scatter",
             "sense.gyro_noise", "sense.accel_noise", "sense.attitude_noise")  # fmt: skip
 
 
