@@ -39,7 +39,7 @@ PRIOR_SIGMAS = {"rotor.tau_down": 0.05, "sense.latency": 0.005, "world.sensed_ga
 MOMENT_NMM = (5.7, 6.3)
 """The fit of section 4 sees flights with a moment in this range; the others are left out and judged."""
 _TRIED_FEET = (
-    {"leg.foot_damping": 2e-4}, {"leg.foot_damping": 8e-4}, {"leg.stiffness": 0.05}, {"leg.stiffness": 0.12},
+    {"leg.foot_damping": 2e-4}, {"leg.foot_damping": 8e-4}, {"leg.stiffness": 0.05}, {"leg.stiffness": 0.14},
     {"leg.adhesion": 5.0}, {"leg.adhesion": 2.0}, {"leg.adhesion": 1.0},
 )  # fmt: skip
 N_ROLLOUTS, N_GOOD_FITS = 128, 24
@@ -208,7 +208,7 @@ def identify_from(flights: store.Flights, wrong: dict[str, float], held_out: Any
 
 def replay_figures(flights: store.Flights, world: World) -> dict[str, Any]:
     """Agreement of the flight core with what was logged."""
-    told = replay.replay(flights, world).summary()
+    told = replay.replay(flights, world).summary
     keys = ("n_flights", "n_samples", "n_ticks", "rrev", "of_y", "trigger")
     return {key: told[key] for key in keys}
 
