@@ -33,7 +33,7 @@ def test_every_target_of_make_exists() -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_the_options_that_are_shown(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     words = shlex.split(command.split(" && ")[0])
-    assert cli.run([words[0], "--help"]) == 0
+    assert cli.run([*words[: 2 if words[0] == "flight" else 1], "--help"]) == 0
     text = capsys.readouterr().out
     assert [word for word in words if word.startswith("--") and word not in text] == []
 
