@@ -21,7 +21,7 @@ with SyncCrazyflie(uri_from_env(default="udp://127.0.0.1:19850")) as scf:
     time.sleep(0.5)
     cf.high_level_commander.takeoff(1.0, 2.0)
     time.sleep(3.0)
-    cf.appchannel.send_packet(struct.pack("<BBLff", 1, 1, number, 4.8, 0.008))  # flip at RREV 4.8 1/s with 8 N mm
+    cf.appchannel.send_packet(struct.pack("<BBLff", 1, 1, number, 3.9, 0.0065))  # flip at RREV 3.9 1/s with 6.5 N mm
     for n, request in enumerate([1] * 30 + [2] * 50):  # 1: hover, 2: approach, upwards at 2.5 m/s; at least 10 a second
         cf.appchannel.send_packet(struct.pack("<BBHBfffff", 2, 1, n, request, 0.0, 0.0, 1.0, 2.5, 1.57))
         time.sleep(0.05)

@@ -85,8 +85,8 @@
     X(float, "ivl", "contact_accel", contact_accel_mps2, "m/s^2", 12.0, 1000.0, 25.0, "specific force that means contact (a flip makes 10)") \
     X(float, "ivl", "hang_s", hang_s, "s", 0.02, 5.0, 0.2, "specific force reversed for this long means hanging")                            \
     /* rules: see ivl_guard.c */                                                                                                             \
-    X(float, "ivl", "vbat_rest_min", vbat_V_rest_min, "V", 0.0, 30.0, 3.5, "battery below this refuses to arm")                              \
-    X(float, "ivl", "vbat_min", vbat_V_min, "V", 0.0, 30.0, 3.1, "battery below this aborts")                                                \
+    X(float, "ivl", "vbat_rest_min", vbat_V_rest_min, "V", 0.0, 30.0, 3.2, "battery below this refuses to arm")                              \
+    X(float, "ivl", "vbat_min", vbat_V_min, "V", 0.0, 30.0, 2.7, "battery under load below this aborts")                                             \
     X(float, "ivl", "link_s_max", link_s_max, "s", 0.0, 10.0, 0.5, "link down for longer aborts")                                            \
     X(float, "ivl", "setpoint_s_max", setpoint_s_max, "s", 0.01, 0.45, 0.4, "set-point of the autopilot older than this aborts")             \
     X(float, "ivl", "host_s_max", host_s_max, "s", 0.05, 10.0, 0.5, "last command of the host older than this aborts")                       \

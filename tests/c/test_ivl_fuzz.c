@@ -148,7 +148,7 @@ static void random_vitals(flight_t *f)
     }
     if (rng_below(&f->rng, 24) == 0u)
     {
-        v->vbat_V = isnan(bad) ? bad : 3.0f;
+        v->vbat_V = isnan(bad) ? bad : 2.6f;
     }
 }
 

@@ -167,7 +167,7 @@ static void test_rule_rearm_wants_hover_after_a_landing(void)
 
 static void spoil_battery_rest(ivl_in_t *in)
 {
-    in->vitals.vbat_V = 3.4f;
+    in->vitals.vbat_V = 3.1f;
 }
 
 static void test_rule_battery_rest_refuses_to_arm_on_a_weak_battery(void)
@@ -279,7 +279,7 @@ static void test_rule_host_aborts_when_the_heartbeat_is_lost(void)
 
 static void spoil_battery(ivl_in_t *in)
 {
-    in->vitals.vbat_V = 3.05f;
+    in->vitals.vbat_V = 2.65f;
 }
 
 static void spoil_battery_nan(ivl_in_t *in)

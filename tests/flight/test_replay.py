@@ -294,12 +294,12 @@ def test_log_of_three_digits_is_explained_by_its_step(world: World, log: Flight)
 
 def test_rule_about_the_battery_applies_when_it_is_told(world: World, log: Flight) -> None:
     low = changed(log)
-    low.samples["battery_V"][:] = np.where(log["t_s"] > 0.3, 3.0, 3.3)
+    low.samples["battery_V"][:] = np.where(log["t_s"] > 0.3, 2.6, 3.3)
     assert replay.replay([low], world).summary["flights"][0]["ended_early_by"] == ""
     assert replay.replay([low], world, battery=True).summary["flights"][0]["ended_early_by"] == "battery"
     unknown = replay.replay([log], world, battery=True)
     assert unknown.summary["flights"][0]["ended_early_by"] == "battery"
-    lenient = fixture.world(**{"firmware.vbat_min": 2.9})
+    lenient = fixture.world(**{"firmware.vbat_min": 2.5})
     assert trigger_of(replay.replay([low], lenient, battery=True))["offset_samples"] == 0
 
 

@@ -30,7 +30,7 @@ Examples:
       the core on an emulated STM32F405: "bits" is the same
   ivl flight replay flights/july --step 0.001 --plot replay.png
       the log was cut to three digits; some flights, drawn
-  ivl flight replay flights/july --battery --set firmware.vbat_min=3.0
+  ivl flight replay flights/july --battery --set firmware.vbat_min=2.9
       would the rule about the battery have let them fly?
 """
 _SUFFIXES = (".png", ".svg", ".pdf")
