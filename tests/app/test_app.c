@@ -464,7 +464,7 @@ static void test_tumble_check_is_off_in_flip_and_coast_only_and_on_after_a_resta
 
 static void spoil_vbat(void)
 {
-    sdk.vbat_V = 3.0f;
+    sdk.vbat_V = 2.6f;
 }
 
 static void spoil_link(void)

@@ -389,6 +389,71 @@ static void test_codes_have_names_and_other_numbers_have_none(void)
     TEST_ASSERT_TRUE(strlen(ivl_sil_phase_name(IVL_PHASE_FLIP)) > 1);
 }
 
+/// A state of free flight, at rest in rotation, rotors at hover.
+static ivl_sim_spec_t stated(double height_m, double vx, double vz)
+{
+    ivl_sim_spec_t spec = spec_of(2.5, 60.0, 0.0, 6.0, IVL_SIM_START_STATE);
+    spec.p_start_W_m[2] = height_m;
+    spec.v_start_W_mps[0] = vx;
+    spec.v_start_W_mps[2] = vz;
+    spec.q_start_WB[3] = 1.0;
+    for (int i = 0; i < 4; i++)
+    {
+        spec.rotor_start_radps[i] = -1.0;
+    }
+    return spec;
+}
+
+static void test_start_at_the_trigger_is_a_case_of_a_stated_start(void)
+{
+    const ivl_sim_params_t params = fixture_params();
+    const ivl_sim_model_t  model = fixture_model(&params);
+    ivl_sim_spec_t         level = spec_of(2.5, 60.0, 4.0, 6.0, IVL_SIM_START_AT_TRIGGER);
+    level.d_ceil_m[0] = 0.5;
+    double sin_angle, cos_angle;
+    ivl_sim_sincos(60.0 * (IVL_SIM_PI / 180.0), &sin_angle, &cos_angle);
+    const double            plane = params.world_ceiling_height_m + params.world_sensed_gap_offset_m;
+    const ivl_sim_spec_t    same = stated(plane - 0.5, 2.5 * cos_angle, 2.5 * sin_angle);
+    const ivl_sim_outcome_t a = fly(&model, &level), b = fly(&model, &same);
+    TEST_ASSERT_EQUAL_MEMORY(&a, &b, sizeof a);
+    TEST_ASSERT_EQUAL_INT32(1, a.triggered[0]);
+}
+
+static void test_stated_starts_that_are_none_are_refused(void)
+{
+    const ivl_sim_params_t params = fixture_params();
+    const ivl_sim_model_t  model = fixture_model(&params);
+    ivl_sim_spec_t         spec[5];
+    for (int i = 0; i < 5; i++)
+    {
+        spec[i] = stated(2.0, 0.0, 2.5);
+    }
+    spec[0].q_start_WB[3] = 0.9;                                     // no rotation
+    spec[1].p_start_W_m[2] = params.world_ceiling_height_m + 0.001;  // behind the ceiling
+    spec[2].w_start_B_radps[1] = NAN;
+    spec[3].rotor_start_radps[2] = 1.0e6;
+    spec[4].battery_start_V[0] = -1.0;
+    for (int i = 0; i < 5; i++)
+    {
+        TEST_ASSERT_EQUAL_INT32(IVL_SIM_END_REFUSED, fly(&model, &spec[i]).end_reason[0]);
+    }
+}
+
+static void test_a_stated_turn_goes_on(void)
+{
+    const ivl_sim_params_t params = fixture_params();
+    const ivl_sim_model_t  model = fixture_model(&params);
+    ivl_sim_spec_t         spec = stated(2.0, 0.3, 2.5);
+    // nose up by 30 degrees and turning at 10 rad/s: the flip, which begins at once, arrives earlier
+    spec.q_start_WB[1] = -sin(15.0 * (IVL_SIM_PI / 180.0));
+    spec.q_start_WB[3] = cos(15.0 * (IVL_SIM_PI / 180.0));
+    spec.w_start_B_radps[1] = -10.0;
+    const ivl_sim_outcome_t turning = fly(&model, &spec);
+    const ivl_sim_spec_t    level = stated(2.0, 0.3, 2.5);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 10.0, turning.rate_trigger_radps[0]);
+    TEST_ASSERT_TRUE(turning.theta_impact_deg[0] > fly(&model, &level).theta_impact_deg[0] + 90.0);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -405,5 +470,8 @@ int main(void)
     RUN_TEST(test_tables_describe_their_records_without_gaps_or_overlaps);
     RUN_TEST(test_a_model_is_made_of_numbers_in_range_only);
     RUN_TEST(test_codes_have_names_and_other_numbers_have_none);
+    RUN_TEST(test_start_at_the_trigger_is_a_case_of_a_stated_start);
+    RUN_TEST(test_stated_starts_that_are_none_are_refused);
+    RUN_TEST(test_a_stated_turn_goes_on);
     return UNITY_END();
 }

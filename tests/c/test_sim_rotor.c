@@ -1,10 +1,20 @@
 /// @file test_sim_rotor.c
-/// Rotor lag, mean thrust, saturation, scatter and ceiling effect against closed forms.
+/// Rotor lag, decay, mean thrust, saturation, battery, scatter, ceiling effect and inflow against closed forms.
 #include "sim_rotor.h"
 
 #include "sim_fixture.h"
 
-static const double LEVEL[4] = {0.0, 0.0, 0.0, 1.0};
+/// Level and at rest, at a height.
+static ivl_sim_airflow_t level_at(double height_m)
+{
+    return (ivl_sim_airflow_t){.height_m = height_m, .q_WB = {0.0, 0.0, 0.0, 1.0}};
+}
+
+static ivl_sim_thrust_t step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m, double dt_s)
+{
+    const ivl_sim_airflow_t body = level_at(height_m);
+    return ivl_sim_rotor_step(model, rotor, &body, dt_s);
+}
 
 /// A model whose time constants up and down differ and are both resolved by the tests.
 static ivl_sim_params_t slow_params(void)
@@ -40,7 +50,7 @@ static void check_step(double start_radps, float thrust_N, double tau_s)
     while (t < 0.5)
     {
         const double dt = draw(&draws, 1.0e-5, 0.004);
-        ivl_sim_rotor_step(&model, &rotor, 0.0, LEVEL, dt);
+        step(&model, &rotor, 0.0, dt);
         t += dt;
         const double expected = command + (start_radps - command) * exp(-t / tau_s);
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-9 * (start_radps + command), expected, rotor.speed_radps[2]);
@@ -71,12 +81,12 @@ static void test_mean_thrust_is_exact_for_any_step_and_any_division_of_it(void)
         const double    integral = command * command * T + 2.0 * command * gap * tau * (1.0 - e) + 0.5 * gap * gap * tau * (1.0 - e * e);
         const double    expected = 4.0 * params.rotor_thrust_constant_Ns2 * integral / T;
         ivl_sim_rotor_t whole = rotor_at(&model, starts[k], 0.06f), parts = whole;
-        TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, expected, ivl_sim_rotor_step(&model, &whole, 0.0, LEVEL, T).thrust_N);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, expected, step(&model, &whole, 0.0, T).thrust_N);
         double sum = 0.0;
         for (int i = 0; i < 64; i++)
         {
             const double dt = T * (2.0 * i + 1.0) / 4096.0;
-            sum += dt * ivl_sim_rotor_step(&model, &parts, 0.0, LEVEL, dt).thrust_N;
+            sum += dt * step(&model, &parts, 0.0, dt).thrust_N;
         }
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, expected, sum / T);
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, whole.speed_radps[0], parts.speed_radps[0]);
@@ -89,7 +99,7 @@ static void test_thrust_is_that_of_the_instant_when_the_step_has_no_length(void)
     const ivl_sim_model_t  model = fixture_model(&params);
     ivl_sim_rotor_t        rotor = rotor_at(&model, 1500.0, 0.15f);
     const double           expected = 4.0 * params.rotor_thrust_constant_Ns2 * 1500.0 * 1500.0;
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, expected, ivl_sim_rotor_step(&model, &rotor, 0.0, LEVEL, 0.0).thrust_N);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, expected, step(&model, &rotor, 0.0, 0.0).thrust_N);
 }
 
 static void test_commands_saturate_and_what_is_no_number_stops_the_motor(void)
@@ -119,8 +129,8 @@ static void test_each_motor_makes_the_moment_of_its_place_and_its_sense_of_rotat
         command[i] = 0.1f;
         ivl_sim_rotor_t rotor = rotor_at(&model, 0.0, 0.0f);
         ivl_sim_rotor_command(&model, &rotor, command);
-        ivl_sim_rotor_step(&model, &rotor, 0.0, LEVEL, 5.0);
-        const ivl_sim_thrust_t load = ivl_sim_rotor_step(&model, &rotor, 0.0, LEVEL, 0.001);
+        step(&model, &rotor, 0.0, 5.0);
+        const ivl_sim_thrust_t load = step(&model, &rotor, 0.0, 0.001);
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-8, 0.1, load.thrust_N);
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, sign_y[i] * 0.033 * 0.1, load.torque_B_Nm[0]);
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, -sign_x[i] * 0.033 * 0.1, load.torque_B_Nm[1]);
@@ -137,7 +147,7 @@ static void test_scatter_multiplies_each_thrust_when_it_is_set(void)
     rotor.scatter[0] = 1.1;
     rotor.scatter[3] = 0.9;
     const double           each = 0.25 * model.mass_total_kg * params.world_gravity_mps2;
-    const ivl_sim_thrust_t load = ivl_sim_rotor_step(&model, &rotor, 0.0, LEVEL, 0.002);
+    const ivl_sim_thrust_t load = step(&model, &rotor, 0.0, 0.002);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, 4.0 * each, load.thrust_N);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, (-1.1 + 0.9) * each * params.rotor_y_m, load.torque_B_Nm[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, 0.0, load.torque_B_Nm[1]);
@@ -181,8 +191,7 @@ static void test_thrust_grows_as_stated_when_the_rotor_nears_the_ceiling(void)
         ivl_sim_rotor_init(&model, &rotor);
         const double height = params.world_ceiling_height_m - params.rotor_z_m - gaps[i];
         const double ratio = radius / fmax(gaps[i], 0.5 * radius);  // the formula ends at half a radius
-        TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, weight * (1.0 + 0.0625 * ratio * ratio),
-                                  ivl_sim_rotor_step(&model, &rotor, height, LEVEL, 0.001).thrust_N);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, weight * (1.0 + 0.0625 * ratio * ratio), step(&model, &rotor, height, 0.001).thrust_N);
     }
 }
 
@@ -190,12 +199,212 @@ static void test_ceiling_effect_vanishes_when_the_vehicle_is_inverted(void)
 {
     ivl_sim_params_t params = fixture_params();
     params.aero_ceiling_gain_norm = 0.0625;
-    const ivl_sim_model_t model = fixture_model(&params);
-    const double          inverted[4] = {0.0, 1.0, 0.0, 0.0};
-    ivl_sim_rotor_t       rotor;
+    const ivl_sim_model_t   model = fixture_model(&params);
+    const ivl_sim_airflow_t body = {.height_m = params.world_ceiling_height_m - 0.05, .q_WB = {0.0, 1.0, 0.0, 0.0}};
+    ivl_sim_rotor_t         rotor;
     ivl_sim_rotor_init(&model, &rotor);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, model.mass_total_kg * params.world_gravity_mps2,
-                              ivl_sim_rotor_step(&model, &rotor, params.world_ceiling_height_m - 0.05, inverted, 0.001).thrust_N);
+                              ivl_sim_rotor_step(&model, &rotor, &body, 0.001).thrust_N);
+}
+
+// ---- decay with a share of drag that grows with the square of the speed -------------------------------------------------
+
+static ivl_sim_params_t drag_params(double share)
+{
+    ivl_sim_params_t p = slow_params();
+    p.rotor_tau_down_s = 0.19;
+    p.rotor_drag_share_norm = share;
+    return p;
+}
+
+/// dg/dt = -(g / tau) [(1 - share) + share (g + 2 c) / full], by a fine Runge-Kutta of fourth order.
+static double integrated(const ivl_sim_model_t *model, double g, double command, double time_s)
+{
+    const double share = model->raw.rotor_drag_share_norm, tau = model->raw.rotor_tau_down_s, full = model->rotor_speed_max_radps;
+    const int    n = 20000;
+    const double h = time_s / n;
+    for (int i = 0; i < n; i++)
+    {
+        double k[4], at = g;
+        for (int j = 0; j < 4; j++)
+        {
+            k[j] = -at / tau * (1.0 - share + share * (at + 2.0 * command) / full);
+            at = g + h * ((j < 2) ? 0.5 : 1.0) * k[j];
+        }
+        g += h / 6.0 * (k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3]);
+    }
+    return command + g;
+}
+
+static void test_decay_follows_its_law_for_any_division_of_the_time(void)
+{
+    const double shares[] = {0.1, 0.5, 0.9, 0.95};
+    draws_t      draws = {5};
+    for (int k = 0; k < 4; k++)
+    {
+        const ivl_sim_params_t params = drag_params(shares[k]);
+        const ivl_sim_model_t  model = fixture_model(&params);
+        for (int stop = 0; stop < 2; stop++)
+        {
+            const double    start = 2500.0, command = stop ? 0.0 : sqrt((double)0.03f / params.rotor_thrust_constant_Ns2);
+            ivl_sim_rotor_t rotor = rotor_at(&model, start, stop ? 0.0f : 0.03f);
+            double          t = 0.0;
+            while (t < 0.4)
+            {
+                const double dt = draw(&draws, 1.0e-5, 0.002);
+                step(&model, &rotor, 0.0, dt);
+                t += dt;
+            }
+            TEST_ASSERT_DOUBLE_WITHIN(1.0e-6 * start, integrated(&model, start - command, command, t), rotor.speed_radps[1]);
+        }
+    }
+}
+
+static void test_mean_thrust_of_a_decay_is_that_of_a_fine_division(void)
+{
+    const ivl_sim_params_t params = drag_params(0.9);
+    const ivl_sim_model_t  model = fixture_model(&params);
+    ivl_sim_rotor_t        whole = rotor_at(&model, 2500.0, 0.01f), parts = whole;
+    const double           mean = step(&model, &whole, 0.0, 0.002).thrust_N;
+    double                 sum = 0.0;
+    for (int i = 0; i < 200; i++)
+    {
+        sum += step(&model, &parts, 0.0, 1.0e-5).thrust_N / 200.0;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, sum, mean);
+}
+
+static void test_a_rotor_never_falls_below_its_command_and_ends_still(void)
+{
+    const ivl_sim_params_t params = drag_params(0.9);
+    const ivl_sim_model_t  model = fixture_model(&params);
+    ivl_sim_rotor_t        rotor = rotor_at(&model, 2500.0, 0.02f), stopped = rotor_at(&model, 2500.0, 0.0f);
+    double                 last = 2500.0;
+    for (int i = 0; i < 3000; i++)
+    {
+        step(&model, &rotor, 0.0, 0.002);
+        step(&model, &stopped, 0.0, 0.002);
+        TEST_ASSERT_TRUE(rotor.speed_radps[0] <= last && rotor.speed_radps[0] >= rotor.command_radps[0]);
+        last = rotor.speed_radps[0];
+    }
+    while (!ivl_sim_rotor_still(&stopped))
+    {
+        step(&model, &stopped, 0.0, 0.002);
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, stopped.speed_radps[3]);
+}
+
+static void test_drag_that_grows_is_refused_with_rotors_that_stop_at_once(void)
+{
+    ivl_sim_params_t params = drag_params(0.5);
+    params.rotor_tau_down_s = 0.005;
+    ivl_sim_model_t model;
+    ivl_cfg_t       firmware;
+    char            error[200] = "";
+    ivl_cfg_defaults(&firmware);
+    TEST_ASSERT_FALSE(ivl_sim_model_init(&model, &params, &firmware, error, sizeof error));
+    TEST_ASSERT_NOT_NULL(strstr(error, "rotor.drag_share"));
+}
+
+// ---- battery ------------------------------------------------------------------------------------------------------------
+
+static ivl_sim_params_t battery_params(double compensated)
+{
+    ivl_sim_params_t p = slow_params();
+    p.battery_voltage_V = 3.9;
+    p.battery_sag_VpN = 1.4;
+    p.battery_rated_voltage_V = 3.5;
+    p.battery_speed_slope_norm = 0.8;
+    p.battery_compensated_norm = compensated;
+    return p;
+}
+
+static void test_voltage_falls_with_the_thrust_of_all_rotors(void)
+{
+    const ivl_sim_params_t params = battery_params(0.0);
+    const ivl_sim_model_t  model = fixture_model(&params);
+    ivl_sim_rotor_t        rotor = rotor_at(&model, 2000.0, 0.1f);
+    rotor.speed_radps[2] = 1000.0;
+    const double square = 3.0 * 2000.0 * 2000.0 + 1000.0 * 1000.0;
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, 3.9 - 1.4 * params.rotor_thrust_constant_Ns2 * square, ivl_sim_rotor_voltage(&model, &rotor));
+}
+
+static void test_command_is_scaled_by_the_voltage_unless_it_is_compensated(void)
+{
+    for (int compensated = 0; compensated < 2; compensated++)
+    {
+        const ivl_sim_params_t params = battery_params(compensated);
+        const ivl_sim_model_t  model = fixture_model(&params);
+        const double           wanted = sqrt((double)0.08f / params.rotor_thrust_constant_Ns2);
+        ivl_sim_rotor_t        rotor = rotor_at(&model, 2200.0, 0.08f);
+        const double           scale = 1.0 + 0.8 * (ivl_sim_rotor_voltage(&model, &rotor) / 3.5 - 1.0);
+        TEST_ASSERT_TRUE(scale < 0.999);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, compensated ? wanted : scale * wanted, rotor.command_radps[0]);
+        // at full duty the voltage limits the speed either way
+        const float all[4] = {1.0f, 1.0f, 1.0f, 1.0f};
+        ivl_sim_rotor_command(&model, &rotor, all);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, scale * model.rotor_speed_max_radps, rotor.command_radps[0]);
+    }
+}
+
+static void test_thrust_gain_scales_what_is_delivered_below_saturation(void)
+{
+    ivl_sim_params_t params = slow_params();
+    params.rotor_thrust_gain_norm = 0.9;
+    const ivl_sim_model_t model = fixture_model(&params);
+    ivl_sim_rotor_t       rotor = rotor_at(&model, 0.0, 0.1f);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, sqrt(0.9 * (double)0.1f / params.rotor_thrust_constant_Ns2), rotor.command_radps[0]);
+    const float all[4] = {1.0f, 1.0f, 1.0f, 1.0f};
+    ivl_sim_rotor_command(&model, &rotor, all);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, model.rotor_speed_max_radps, rotor.command_radps[0]);
+}
+
+static void test_battery_of_a_world_is_drawn_once_a_rollout_with_the_stated_deviation(void)
+{
+    ivl_sim_params_t params = battery_params(0.0);
+    params.battery_voltage_scatter_V = 0.08;
+    const ivl_sim_model_t  model = fixture_model(&params);
+    static ivl_sim_group_t group;
+    const double           p[3] = {0.0, 0.0, 1.0}, v[3] = {0.0, 0.0, 0.0};
+    double                 sum = 0.0, square = 0.0;
+    const int              n = 4000;
+    ivl_sim_group_init(&model, &group);
+    for (int i = 0; i < n; i++)
+    {
+        const ivl_sim_rng_t rng = {9, (uint64_t)i};
+        ivl_sim_world_start(&group, 0, &rng, p, v);
+        const double error = group.world[0].rotor.open_circuit_V - 3.9;
+        sum += error;
+        square += error * error;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(5.0 * 0.08 / sqrt(n), 0.0, sum / n);
+    TEST_ASSERT_DOUBLE_WITHIN(5.0 * 0.08 / sqrt(2.0 * n), 0.08, sqrt(square / n));
+    ivl_sim_start_state_t start = {.q_WB = {0.0, 0.0, 0.0, 1.0}, .battery_V = 3.7};
+    const ivl_sim_rng_t   rng = {9, 0};
+    ivl_sim_world_start_from(&group, 0, &rng, &start);
+    TEST_ASSERT_EQUAL_DOUBLE(3.7, group.world[0].rotor.open_circuit_V);
+}
+
+// ---- inflow -------------------------------------------------------------------------------------------------------------
+
+static void test_thrust_is_lost_to_a_climb_along_the_axis_alone(void)
+{
+    ivl_sim_params_t params = slow_params();
+    params.rotor_inflow_loss_spm = 0.03;
+    const ivl_sim_model_t   model = fixture_model(&params);
+    const double            weight = model.mass_total_kg * params.world_gravity_mps2;
+    const ivl_sim_airflow_t climbs = {.v_W_mps = {1.0, -2.0, 2.5}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
+    const ivl_sim_airflow_t sinks = {.v_W_mps = {1.0, -2.0, -2.5}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
+    // nose up by a quarter turn: the axis points along -x
+    const ivl_sim_airflow_t        turned = {.v_W_mps = {-1.0, 0.5, 2.5}, .q_WB = {0.0, -sqrt(0.5), 0.0, sqrt(0.5)}};
+    const ivl_sim_airflow_t *const flows[3] = {&climbs, &sinks, &turned};
+    const double                   expected[3] = {1.0 - 0.03 * 2.5, 1.0, 1.0 - 0.03 * 1.0};
+    for (int i = 0; i < 3; i++)
+    {
+        ivl_sim_rotor_t rotor;
+        ivl_sim_rotor_init(&model, &rotor);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, weight * expected[i], ivl_sim_rotor_step(&model, &rotor, flows[i], 0.001).thrust_N);
+    }
 }
 
 int main(void)
@@ -211,5 +420,14 @@ int main(void)
     RUN_TEST(test_scatter_of_a_world_has_the_stated_deviation);
     RUN_TEST(test_thrust_grows_as_stated_when_the_rotor_nears_the_ceiling);
     RUN_TEST(test_ceiling_effect_vanishes_when_the_vehicle_is_inverted);
+    RUN_TEST(test_decay_follows_its_law_for_any_division_of_the_time);
+    RUN_TEST(test_mean_thrust_of_a_decay_is_that_of_a_fine_division);
+    RUN_TEST(test_a_rotor_never_falls_below_its_command_and_ends_still);
+    RUN_TEST(test_drag_that_grows_is_refused_with_rotors_that_stop_at_once);
+    RUN_TEST(test_voltage_falls_with_the_thrust_of_all_rotors);
+    RUN_TEST(test_command_is_scaled_by_the_voltage_unless_it_is_compensated);
+    RUN_TEST(test_thrust_gain_scales_what_is_delivered_below_saturation);
+    RUN_TEST(test_battery_of_a_world_is_drawn_once_a_rollout_with_the_stated_deviation);
+    RUN_TEST(test_thrust_is_lost_to_a_climb_along_the_axis_alone);
     return UNITY_END();
 }

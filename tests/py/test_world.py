@@ -212,3 +212,45 @@ def test_changed_world_equals_one_made_anew() -> None:
     assert pickle.loads(pickle.dumps(changed)).params == made.params
     with pytest.raises(ConfigError, match=r"out of range"):
         made.changed(**{"sense.latency": 5.0})
+
+
+def test_a_recorded_state_started_anew_gives_the_rest_of_the_landing() -> None:
+    quiet = {"sense.position_noise": 0.0, "sense.velocity_noise": 0.0, "battery.voltage_scatter": 0.0}
+    world = ivl.World("crazyflie21", "wide_short", "table1", None, **quiet)
+    whole = world.trace(2.5, 80.0, 3.9, 6.5, start="flown", period_s=0.002)
+    rows = whole.rows
+    at = int(np.argmax(rows.phase == 3)) - 1  # the last row before the trigger
+    state = ivl.State(
+        rows.p_WB_m[at], rows.v_WB_mps[at], rows.q_WB[at], rows.w_B_radps[at],
+        np.sqrt(rows.thrust_N[at] / world.params.values["rotor.thrust_constant"]),
+        world.params.values["battery.voltage"],
+    )  # fmt: skip
+    rest = world.trace(2.5, 80.0, 0.0, 6.5, start="state", state=state, period_s=0.002)
+    n = min(100, len(rest.rows), len(rows) - at)
+    assert rest.rows.pitch_deg[:n] == pytest.approx(rows.pitch_deg[at : at + n], abs=0.01)
+    assert rest.rows.p_WB_m[:n] == pytest.approx(rows.p_WB_m[at : at + n], abs=1e-5)
+    assert rest.outcome.n_legs == whole.outcome.n_legs
+
+
+def test_states_broadcast_with_the_other_arguments() -> None:
+    world = ivl.World("habas2021")
+    state = ivl.State(np.array([[0, 0, 2.2], [0, 0, 2.3], [0, 0, 2.4]]), v_W_mps=(0.0, 0.0, 2.5))
+    out = world.rollouts(2.5, 90.0, 0.0, [[5.0], [8.0]], start="state", state=state)
+    assert out.shape == (2, 3)
+    single = world.rollouts(2.5, 90.0, 0.0, 8.0, start="state", state=ivl.State((0, 0, 2.3), (0, 0, 2.5)), stream=4)
+    assert single["d_min_m"] == out["d_min_m"][1, 1]
+
+
+@pytest.mark.parametrize(("start", "state", "words"), [
+    ("state", None, "start='state' needs it"),
+    ("flown", ivl.State((0, 0, 2.0)), "start='state' needs it, others must not have it"),
+    ("state", ivl.State((0, 2.0)), "3 components are needed"),
+    ("state", ivl.State((0, 0, 2.0), q_WB=(0, 0, 0, 0.9)), "a unit quaternion"),
+    ("state", ivl.State((0, 0, 2.0), q_WB=(0, 0, 0)), "4 components are needed"),
+    ("state", ivl.State((0, 0, float("nan"))), "out of range"),
+    ("state", ivl.State((0, 0, 2.0), w_B_radps=(0, 1e4, 0)), "out of range"),
+    ("state", ivl.State((0, 0, 2.0), battery_V=-3.0), "out of range"),
+])  # fmt: skip
+def test_bad_states_are_refused(start: str, state: ivl.State | None, words: str) -> None:
+    with pytest.raises(ArgumentError, match=words):
+        ivl.World("habas2021").rollouts(2.5, 90.0, 4.0, 6.0, start=start, state=state)
