@@ -443,13 +443,13 @@ static void test_a_stated_turn_goes_on(void)
 {
     const ivl_sim_params_t params = fixture_params();
     const ivl_sim_model_t  model = fixture_model(&params);
-    ivl_sim_spec_t         spec = stated(2.5, 0.3, 2.5);
+    ivl_sim_spec_t         spec = stated(2.6, 0.3, 2.5);
     // nose up by 30 degrees and turning at 10 rad/s: the flip, which begins at once, arrives earlier
     spec.q_start_WB[1] = -sin(15.0 * (IVL_SIM_PI / 180.0));
     spec.q_start_WB[3] = cos(15.0 * (IVL_SIM_PI / 180.0));
     spec.w_start_B_radps[1] = -10.0;
     const ivl_sim_outcome_t turning = fly(&model, &spec);
-    const ivl_sim_spec_t    level = stated(2.5, 0.3, 2.5);
+    const ivl_sim_spec_t    level = stated(2.6, 0.3, 2.5);
     TEST_ASSERT_DOUBLE_WITHIN(0.05, 10.0, turning.rate_trigger_radps[0]);
     TEST_ASSERT_TRUE(turning.theta_impact_deg[0] > fly(&model, &level).theta_impact_deg[0] + 20.0);
 }
