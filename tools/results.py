@@ -2,6 +2,7 @@
 
     .venv/bin/python tools/results.py table              every learner in the paper's experiment, 100 seeds
     .venv/bin/python tools/results.py other              other approaches, 50 seeds
+    .venv/bin/python tools/results.py flight             every learner in the experiment as it was flown, 50 seeds
     .venv/bin/python tools/results.py maps               docs/figures/map_*.png
 
 Each cell of a table is kept in build/results as JSON, so that an interrupted run continues; remove the folder to start
@@ -30,7 +31,12 @@ from ivl.store import RunStore
 ROOT = Path(__file__).parent.parent
 CACHE = ROOT / "build" / "results"
 FIGURES = ROOT / "docs" / "figures"
-FILES = {"ideal": "experiments/paper_vertical.yaml", "noise": "experiments/paper_vertical_noise.yaml"}
+FILES = {
+    "ideal": "experiments/paper_vertical.yaml",
+    "noise": "experiments/paper_vertical_noise.yaml",
+    "flight": "experiments/paper_flight.yaml",
+}
+SIMULATED = ("ideal", "noise")
 GEAR_SETS = ("as_simulated", "table1")
 LEARNERS = ("ephe", "ephe_new", "ephe_robust", "cmaes", "cmaes_lr", "bo")
 OTHER_LEARNERS = ("ephe_robust", "bo")
@@ -61,8 +67,8 @@ class Condition:
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(description="regenerate the tables and maps of docs/RESULTS.md")
-    parser.add_argument("what", choices=("table", "other", "maps"))
-    parser.add_argument("--trials", type=int, help="seeds a cell; omitted: 100 for the table, 50 for other approaches")
+    parser.add_argument("what", choices=("table", "other", "flight", "maps"))
+    parser.add_argument("--trials", type=int, help="seeds a cell; omitted: 100 for the table, 50 for the others")
     parser.add_argument("--first-seed", type=int, default=0, help="seeds from here on; tuning used 1000 to 1999")
     parser.add_argument("--learners", nargs="+", help="omitted: all of the table")
     parser.add_argument("--threads", type=int, default=1, help="of the simulator")
@@ -71,25 +77,26 @@ def main() -> int:
         for condition in paper_conditions():
             print(draw_map(condition, args.threads).relative_to(ROOT))
         return 0
-    other = args.what == "other"
-    conditions = other_conditions() if other else paper_conditions()
-    learners = args.learners or (OTHER_LEARNERS if other else LEARNERS)
+    flight = [Condition("table1", "flight")]
+    conditions = {"table": paper_conditions(), "other": other_conditions(), "flight": flight}[args.what]
+    learners = args.learners or (OTHER_LEARNERS if args.what == "other" else LEARNERS)
+    n_trials = args.trials or (100 if args.what == "table" else 50)
     for condition in conditions:
-        print_table(condition, learners, args.trials or (50 if other else 100), args.first_seed, args.threads)
+        print_table(condition, learners, n_trials, args.first_seed, args.threads)
     return 0
 
 
 def paper_conditions() -> Iterator[Condition]:
     """Both gear sets, ideal and noisy."""
     for gear_set in GEAR_SETS:
-        for sensing in FILES:
+        for sensing in SIMULATED:
             yield Condition(gear_set, sensing)
 
 
 def other_conditions() -> Iterator[Condition]:
     """Approaches that no option was chosen on."""
     for speed_mps, angle_deg in OTHER_APPROACHES:
-        for sensing in FILES:
+        for sensing in SIMULATED:
             yield Condition("as_simulated", sensing, speed_mps, angle_deg)
 
 
