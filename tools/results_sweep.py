@@ -1,6 +1,7 @@
 """Regenerate the campaign's part of docs/RESULTS.md from data that are kept beside it.
 
     .venv/bin/python tools/results_sweep.py collect RUN... [--map RUN...]   run folders -> docs/data
+    .venv/bin/python tools/results_sweep.py collect RUN... --keep           the same; runs of other kinds stay
     .venv/bin/python tools/results_sweep.py write                           docs/data -> docs/RESULTS.md
     .venv/bin/python tools/results_sweep.py check                           is docs/RESULTS.md what `write` would write?
 
@@ -28,6 +29,7 @@ from ivl.sweep import store
 ROOT = Path(__file__).parent.parent
 DATA, RESULTS = ROOT / "docs" / "data", ROOT / "docs" / "RESULTS.md"
 BEGIN, END = "<!-- campaign: begin -->", "<!-- campaign: end -->"
+_KIND = ("vehicle", "gear_set", "learner")
 _OF_A_RUN = ("name", "vehicle", "gear_set", "learner", "seed", "git_commit", "model_sha256", "library_sha256")
 
 
@@ -51,11 +53,12 @@ def main(arguments: list[str] | None = None) -> int:
     collecting = commands.add_parser("collect", help="run folders -> data")
     collecting.add_argument("runs", nargs="+", type=Path, metavar="RUN")
     collecting.add_argument("--map", nargs="*", type=Path, default=[], dest="maps", metavar="RUN")
+    collecting.add_argument("--keep", action="store_true", help="keep the data of other vehicles, gears and learners")
     commands.add_parser("write", help="data -> RESULTS.md")
     commands.add_parser("check", help="compare RESULTS.md with the data")
     args = parser.parse_args(arguments)
     if args.command == "collect":
-        collect(args.runs, args.maps, args.data)
+        collect(args.runs, args.maps, args.data, args.keep)
         return 0
     old = args.results.read_text(encoding="utf-8")
     new = replace_section(old, section(read(args.data)))
@@ -68,16 +71,27 @@ def main(arguments: list[str] | None = None) -> int:
     return 1 if different else 0
 
 
-def collect(runs: list[Path], maps: list[Path], folder: Path) -> None:
-    """Pack run folders into the data folder, replacing what is there."""
+def collect(runs: list[Path], maps: list[Path], folder: Path, keep: bool = False) -> None:
+    """Pack run folders into the data folder, replacing what is there; with `keep` only what is of the same kinds."""
     folder.mkdir(parents=True, exist_ok=True)
     packed = [compact.pack(store.read_trials(run), store.read_episodes(run)) for run in runs]
+    kept: list[dict[str, Any]] = []
+    if keep:
+        fresh = {_kind(row) for table in packed for row in table.select(list(_KIND)).to_pylist()}
+        before = pq.read_table(folder / "trials.parquet")
+        stays = [_kind(row) not in fresh for row in before.select(list(_KIND)).to_pylist()]
+        packed = [before.filter(pa.array(stays)), *packed]
+        kept = [run for run in read(folder).runs if _kind(run) not in fresh]
     _write(pa.concat_tables(packed).unify_dictionaries(), folder / "trials.parquet")
     states = [compact.pack_states(region.map_states(store.read_map(run))) for run in maps]
     if states:
         _write(pa.concat_tables(states).unify_dictionaries(), folder / "states.parquet")
-    about = [_describe(run) for run in (*runs, *maps)]
+    about = [*kept, *(_describe(run) for run in (*runs, *maps))]
     (folder / "runs.json").write_text(json.dumps(about, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def _kind(row: dict[str, Any]) -> tuple[Any, ...]:
+    return tuple(row.get(name) for name in _KIND)
 
 
 def read(folder: Path) -> Data:

@@ -114,6 +114,16 @@ def test_real_run_folders_are_collected(tool: ModuleType, fly: Fly, tmp_path: Pa
     assert [run["gear_set"] for run in data.runs] == ["as_simulated"] * 2
     assert json.loads((tmp_path / "data" / "runs.json").read_text(encoding="utf-8"))[0]["learner"] == "bo"
     assert "Policy maps" in tool.section(data)
+    # another vehicle joins, the same one replaces itself, and nothing else goes
+    other = fly(
+        config.load_sweep("sweeps/smoke.yaml", [*small, "budget=24", "vehicle=crazyflie21"]), tmp_path / "other"
+    )
+    for _ in range(2):
+        assert tool.main(["--data", str(tmp_path / "data"), "collect", str(other), "--keep"]) == 0
+    both = tool.read(tmp_path / "data")
+    assert both.trials.groupby("vehicle").size().to_dict() == {"habas2021": 8, "crazyflie21": 8}
+    assert len(both.states) == 12
+    assert sorted(run["vehicle"] for run in both.runs) == ["crazyflie21", "habas2021", "habas2021"]
 
 
 def test_the_committed_results_are_those_of_the_committed_data(
