@@ -157,7 +157,7 @@ def test_vehicle_that_aborts_for_its_surroundings_is_not_scored(
     monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 1)
     field = source._field
     assert field is not None
-    monkeypatch.setattr(field, "before_approach", lambda _: server.set("sil.vbat", 2.9))
+    monkeypatch.setattr(field, "before_approach", lambda _: server.set("sil.vbat", 2.6))
     with pytest.raises(RolloutError, match="discarded 1 times"):
         next(source.fly(plan_of(GOOD)))
     assert source.n_discarded == 1
