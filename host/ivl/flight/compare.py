@@ -23,6 +23,7 @@ LANDED_LEGS = 3
 CLASSES = (4, 2, 0)
 """Endings: three or four feet, one or two, none."""
 _WINDOW_RATE = 0.5
+_POLICY_ROLLOUTS = 1000
 _WINDOW_ROLLOUTS, _WINDOW_STEP_PER_S, _WINDOW_MARGIN_PER_S = 64, 0.05, 0.6
 GROUP_NMM, _GROUP_FLIGHTS = 0.3, 3
 _BOOTSTRAPS = 2000
@@ -66,12 +67,14 @@ class Window:
     """Landing rate over the threshold, at one moment.
 
     Attributes:
+        approach: Speed (m/s) and angle (degrees).
         moment_y_Nmm: Moment, N mm.
         rrev_c_per_s: Thresholds, shape (n,).
         rate: Share of landings from hover, shape (n,).
         flown: Threshold and class of each flight near this moment.
     """
 
+    approach: tuple[float, float]
     moment_y_Nmm: float
     rrev_c_per_s: FloatArray
     rate: FloatArray
@@ -137,6 +140,8 @@ class Comparison:
     @staticmethod
     def _window(window: Window) -> dict[str, Any]:
         return {
+            "speed_mps": window.approach[0],
+            "angle_deg": window.approach[1],
             "moment_y_Nmm": window.moment_y_Nmm,
             "simulated_rrev_c_per_s": window.span(),
             "landed_rrev_c_per_s": window.flown_span(),
@@ -202,9 +207,20 @@ def compare(
         rows.append(Row(flip, motion.fly(quiet, flip), rates, class_of(flip.n_legs)))
         if progress:
             progress(number + 1, len(found))
-    windows = tuple(_window(home, group, moment) for moment, group in _groups(found))
-    at_policies = tuple((rrev, moment, _rate(home, rrev, moment, 4 * _WINDOW_ROLLOUTS)) for rrev, moment in policies)
-    return Comparison(tuple(rows), tuple(left_out), windows, at_policies)
+    approach = _usual_approach(found)
+    windows: tuple[Window, ...] = ()
+    at_policies: list[tuple[float, float, float]] = []
+    if approach is not None:
+        alike = [flip for flip in found if flip.approach == approach and np.isfinite(flip.rrev_c_per_s)]
+        windows = tuple(_window(home, approach, group, moment) for moment, group in _groups(alike))
+        at_policies = [
+            (rrev, moment, _rate(home, approach, rrev, moment, _POLICY_ROLLOUTS)) for rrev, moment in policies
+        ]
+    elif policies:
+        raise ConfigError(
+            "--policy: the flights do not say their speed and angle: import them with --speed and --angle"
+        )
+    return Comparison(tuple(rows), tuple(left_out), windows, tuple(at_policies))
 
 
 def in_room(world: World, flip: Flip) -> World:
@@ -286,11 +302,17 @@ def _predict(
     state = scattered(motion.start_state(world, flip), n, rng, known)
     moments = np.clip(flip.moment_y_Nmm * (1.0 + rng.normal(0.0, known.moment_norm, n)), 0.0, None)
     seed = int(rng.integers(2**62))
-    outcomes = world.rollouts(2.5, 90.0, 0.0, moments, seed=seed, start="state", state=state)
+    outcomes = world.rollouts(*motion.FLIP_AT_ONCE, moments, seed=seed, start="state", state=state)
     legs = np.asarray(outcomes.n_legs)
     shares = (legs >= LANDED_LEGS, (legs > 0) & (legs < LANDED_LEGS), legs == 0)
     landed, two, none = (float(np.mean(share)) for share in shares)
     return landed, two, none
+
+
+def _usual_approach(found: Sequence[Flip]) -> tuple[float, float] | None:
+    """The approach that most flights have; None if no flight says."""
+    known = [flip.approach for flip in found if flip.approach is not None]
+    return max(known, key=known.count) if known else None
 
 
 def _groups(found: Sequence[Flip]) -> list[tuple[float, list[Flip]]]:
@@ -310,19 +332,19 @@ def _groups(found: Sequence[Flip]) -> list[tuple[float, list[Flip]]]:
     return groups
 
 
-def _window(world: World, group: Sequence[Flip], moment_y_Nmm: float) -> Window:
-    thresholds = [flip.rrev_c_per_s for flip in group if np.isfinite(flip.rrev_c_per_s)]
+def _window(world: World, approach: tuple[float, float], group: Sequence[Flip], moment_y_Nmm: float) -> Window:
+    thresholds = [flip.rrev_c_per_s for flip in group]
     low, high = min(thresholds) - _WINDOW_MARGIN_PER_S, max(thresholds) + _WINDOW_MARGIN_PER_S
     grid = np.arange(max(low, 0.5), high, _WINDOW_STEP_PER_S)
-    rate = np.array([_rate(world, float(rrev), moment_y_Nmm, _WINDOW_ROLLOUTS) for rrev in grid])
+    rate = np.array([_rate(world, approach, float(rrev), moment_y_Nmm, _WINDOW_ROLLOUTS) for rrev in grid])
     flown = [(flip.rrev_c_per_s, class_of(flip.n_legs)) for flip in group]
-    return Window(moment_y_Nmm, grid, rate, tuple((rrev, legs) for rrev, legs in flown if legs is not None))
+    known = tuple((rrev, legs) for rrev, legs in flown if legs is not None)
+    return Window(approach, moment_y_Nmm, grid, rate, known)
 
 
-def _rate(world: World, rrev_c_per_s: float, moment_y_Nmm: float, n: int) -> float:
-    outcomes = world.rollouts(
-        2.5, 90.0, rrev_c_per_s, moment_y_Nmm, start="flown", stream=np.arange(n, dtype=np.uint64)
-    )
+def _rate(world: World, approach: tuple[float, float], rrev_c_per_s: float, moment_y_Nmm: float, n: int) -> float:
+    streams = np.arange(n, dtype=np.uint64)
+    outcomes = world.rollouts(*approach, rrev_c_per_s, moment_y_Nmm, start="flown", stream=streams)
     return float(np.mean(np.asarray(outcomes.n_legs) >= LANDED_LEGS))
 
 

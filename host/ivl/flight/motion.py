@@ -21,6 +21,8 @@ from ivl.world import State, Trace, World
 
 BoolArray = npt.NDArray[np.bool_]
 
+FLIP_AT_ONCE = (1.0, 90.0, 0.0)
+"""Speed, angle and RREV_c of a landing that flips at its first tick; speed and angle then say nothing."""
 MOTION_S = 0.2
 """Motion is compared up to this long after the trigger, or to the contact."""
 _BEFORE_S, _THRUST_S = 0.1, 0.03
@@ -43,7 +45,8 @@ class Flip:
     Attributes:
         label: Of the flight.
         moment_y_Nmm: Policy's moment, magnitude.
-        rrev_c_per_s: Policy's threshold.
+        rrev_c_per_s: Policy's threshold, NaN if it is not known.
+        approach: Speed (m/s) and angle (degrees) that were asked for, None if they are not known.
         h_plane_m: Height of the plane of the cues in W.
         h_surface_m: Height of the ceiling's surface in W, NaN if it was not measured.
         state: State at the trigger as the vehicle sensed it; rotor speeds unknown, battery without load if known.
@@ -63,6 +66,7 @@ class Flip:
     label: str
     moment_y_Nmm: float
     rrev_c_per_s: float
+    approach: tuple[float, float] | None
     h_plane_m: float
     h_surface_m: float
     state: State
@@ -124,6 +128,7 @@ def flip(flight: Flight) -> Flip:
         label=flight.label,
         moment_y_Nmm=float(flight.info["moment_y_Nmm"]),
         rrev_c_per_s=float(flight.info["rrev_c_per_s"]),
+        approach=_approach(flight),
         h_plane_m=float(flight.info["h_plane_m"]),
         h_surface_m=float(flight.info["h_surface_m"]),
         state=state,
@@ -199,7 +204,7 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
         seed: Of the scatter that the vehicle has.
     """
     start = start_state(world, flip) if state is None else state
-    trace = world.trace(2.5, 90.0, 0.0, flip.moment_y_Nmm, seed=seed, start="state", state=start,
+    trace = world.trace(*FLIP_AT_ONCE, flip.moment_y_Nmm, seed=seed, start="state", state=start,
                         period_s=_TRACE_PERIOD_S)  # fmt: skip
     rows = trace.rows
     values = world.params.values
@@ -280,6 +285,11 @@ def contact_time(t_s: FloatArray, rate_radps: FloatArray, window_s: float) -> fl
 def _window(t_s: FloatArray) -> float:
     """A window that this recording resolves."""
     return max(float(np.median(np.diff(t_s))), _CONTACT_WINDOW_S)
+
+
+def _approach(flight: Flight) -> tuple[float, float] | None:
+    speed_mps, angle_deg = float(flight.info["speed_mps"]), float(flight.info["angle_deg"])
+    return (round(speed_mps, 2), round(angle_deg, 1)) if np.isfinite([speed_mps, angle_deg]).all() else None
 
 
 def _trigger_age(flight: Flight) -> float:

@@ -94,7 +94,10 @@ def _report(summary: dict[str, Any], name: str) -> None:
     for window in summary["windows"]:
         simulated, flown = window["simulated_rrev_c_per_s"], window["landed_rrev_c_per_s"]
         text = f"simulated {_span(simulated)}, flown landings {_span(flown)} 1/s"
-        line(f"window at {window['moment_y_Nmm']:.2f} N mm", text)
+        line(
+            f"window at {window['moment_y_Nmm']:.2f} N mm",
+            f"{text}, at {window['speed_mps']:g} m/s and {window['angle_deg']:g} deg",
+        )
     for one in summary["policies"]:
         line(f"rate at ({one['rrev_c_per_s']:g}, {one['moment_y_Nmm']:g}), from hover", f"{one['rate']:.2f}")
 
