@@ -137,6 +137,11 @@ class Engine:
         if plates not in ("native", "same_law"):
             raise ValueError(f"plates: value {plates!r} is unknown (allowed native, same_law)")
         p = self.params = world.params.values
+        for name in ("rotor.drag_share", "rotor.inflow_loss", "battery.voltage"):
+            if p[name] != 0.0:
+                raise ValueError(f"{name}: value {p[name]!r}: the rotors written here have no such part (allowed 0)")
+        if p["rotor.thrust_gain"] != 1.0:
+            raise ValueError(f"rotor.thrust_gain: value {p['rotor.thrust_gain']!r} (allowed 1)")
         self.model = mujoco.MjModel.from_xml_string(mjcf.build(p))
         airframe = self.model.body("airframe").id
         self.model.pair_solref[:] = mjcf.plate_reference(p, float(self.model.body_invweight0[airframe, 0]))
