@@ -1,20 +1,14 @@
 #include "sim_dynamics.h"
 
-// Stabilisation of the length constraints: their error decays at this rate.  It only removes what truncation and rounding
-// leave; the motion does not depend on it.                                                        [MODEL eq. 4.7]
-static const double STABILISATION_PER_S = 150.0;
+#include "sim_matrix.h"
 
 // Compliance of a rod, m/(N s^2) in the units of the constraint's matrix.  Four parallel legs hold the body redundantly;
 // this makes their forces unique.  With the rate above it equals an axial stiffness of 2e7 N/m.
 static const double ROD_COMPLIANCE_PER_KG = 1.0e-3;
 
-// Near +-90 degrees sideways the first hinge's axis falls into the rod (gimbal lock of the universal joint): its lever arm
-// cos(beta) is kept above this value.
-static const double COS_SIDEWAYS_MIN = 0.05;
-
 enum
 {
-    N = 6
+    N = IVL_SIM_TWIST
 };
 
 /// Place of element (i, j), i <= j, in a packed symmetric matrix.
@@ -45,40 +39,6 @@ void ivl_sim_lane_set(ivl_sim_state_t *state, int lane, const ivl_sim_kin_t *kin
 }
 
 // ---- which feet hold on -----------------------------------------------------------------------------------------------
-
-/// Inverse of a symmetric positive definite matrix, by Gauss-Jordan elimination (no pivoting is needed).
-static void invert(const double a[N][N], double inverse[N][N])
-{
-    double m[N][2 * N];
-    for (int i = 0; i < N; i++)
-    {
-        for (int j = 0; j < N; j++)
-        {
-            m[i][j] = a[i][j];
-            m[i][N + j] = (i == j) ? 1.0 : 0.0;
-        }
-    }
-    for (int p = 0; p < N; p++)
-    {
-        const double pivot = 1.0 / m[p][p];
-        for (int j = 0; j < 2 * N; j++)
-        {
-            m[p][j] *= pivot;
-        }
-        for (int i = 0; i < N; i++)
-        {
-            const double f = (i == p) ? 0.0 : m[i][p];
-            for (int j = 0; j < 2 * N; j++)
-            {
-                m[i][j] -= f * m[p][j];
-            }
-        }
-    }
-    for (int i = 0; i < N; i++)
-    {
-        memcpy(inverse[i], &m[i][N], sizeof inverse[i]);
-    }
-}
 
 /// Adds a mass mu at x that resists motion along the unit vector a only.
 static void add_mass_along(double m[N][N], double mu, ivl_d3_t x, ivl_d3_t a)
@@ -132,7 +92,7 @@ void ivl_sim_contact_set(const ivl_sim_model_t *model, ivl_sim_contact_t *contac
 {
     double m[N][N], inverse[N][N];
     build_mass(model, foot, m);
-    invert((const double (*)[N])m, inverse);
+    ivl_sim_invert6((const double (*)[N])m, inverse);
     store_packed((const double (*)[N])m, contact->mass6, lane);
     store_packed((const double (*)[N])inverse, contact->inverse_mass6, lane);
     contact->any_sliding = false;
@@ -169,7 +129,7 @@ static void inverse_while_sliding(const ivl_sim_model_t *model, const ivl_sim_co
         }
         if (slides)
         {
-            invert((const double (*)[N])m, inverse);
+            ivl_sim_invert6((const double (*)[N])m, inverse);
             store_packed((const double (*)[N])inverse, inverse6, lane);
         }
     }
@@ -219,7 +179,7 @@ IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n, 
     const ivl_d3_t   e1 = leg->rest_B[i], e2 = leg->inplane_B[i], e3 = leg->sideways_B[i];
     const ivl_wide_t c = ivl_w3_dot_d3(n, e1), s = ivl_w3_dot_d3(n, e2), t = ivl_w3_dot_d3(n, e3);
     const ivl_wide_t root = ivl_wide_sqrt(c * c + s * s);
-    const ivl_wide_t least = ivl_wide(COS_SIDEWAYS_MIN);
+    const ivl_wide_t least = ivl_wide(IVL_SIM_COS_SIDEWAYS_MIN);
     const ivl_wide_t lever = ivl_wide_select(root > least, root, least);
     // three quotients from one division: divisions are what an evaluation spends most of its time on
     const ivl_angle_t a = ivl_wide_fold(s, c), b = ivl_wide_fold(t, root);
@@ -239,9 +199,30 @@ IVL_SIM_INLINE hinge_t hinge(const ivl_sim_leg_model_t *leg, int i, ivl_w3_t n, 
     return h;
 }
 
+IVL_SIM_INLINE ivl_wide_t larger(ivl_wide_t a, ivl_wide_t b)
+{
+    return ivl_wide_select(b > a, b, a);
+}
+
+/// How much faster than at rest the fastest leg swings.  One that is bent sideways has less inertia about its first hinge; one
+/// whose foot is stuck has the body's.                                                             [MODEL eq. 7.8]
+IVL_SIM_INLINE ivl_wide_t fastest_swing(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const hinge_t h[IVL_SIM_LEGS])
+{
+    ivl_wide_t fastest = ivl_wide(0.0);
+    IVL_SIM_UNROLL
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_wide_t share = ivl_wide_select(contact->inverse_mass[i] > 0.0, ivl_wide(1.0), ivl_wide(model->step.stuck_norm));
+        const ivl_wide_t swing = share * h[i].inv_cos_beta * h[i].inv_cos_beta;
+        fastest = larger(fastest, swing);
+    }
+    return fastest;
+}
+
 /// Forces of the hips' springs and dampers on the feet; a rod's hip end gets the opposite, the body the opposite couple.
 /// [MODEL eq. 3.4]
-IVL_SIM_INLINE void hip_couples(const ivl_sim_model_t *model, const kinematics_t *k, ivl_w3_t couple[IVL_SIM_LEGS])
+IVL_SIM_INLINE void hip_couples(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const kinematics_t *k,
+                                ivl_w3_t couple[IVL_SIM_LEGS], ivl_wide_t *swing)
 {
     const double stiffness = model->raw.leg_stiffness_Nmprad, damping = model->raw.leg_damping_Nmsprad;
     const double inv_length = 1.0 / model->raw.leg_length_m;
@@ -254,6 +235,7 @@ IVL_SIM_INLINE void hip_couples(const ivl_sim_model_t *model, const kinematics_t
         h[i] = hinge(&model->leg, i, k->n[i], &folded[2 * i], &t[2 * i]);
     }
     ivl_wide_unfold(folded, t, deflection, 2 * IVL_SIM_LEGS);
+    *swing = fastest_swing(model, contact, h);
     IVL_SIM_UNROLL
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
@@ -437,14 +419,14 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
     const ivl_sim_leg_model_t *leg = &model->leg;
     const double               length = model->raw.leg_length_m, gravity = model->raw.world_gravity_mps2;
     const double               joint = model->raw.leg_foot_damping_Nmsprad / (length * length);
-    const double               sigma = STABILISATION_PER_S;
+    const double               sigma = IVL_SIM_STABILISATION_PER_S;
     kinematics_t               k;
     kinematics(model, s, &k);
-    ivl_wide_t b[N], r[IVL_SIM_LEGS], u[N], axial[IVL_SIM_LEGS];
+    ivl_wide_t b[N], r[IVL_SIM_LEGS], u[N], axial[IVL_SIM_LEGS], fastest2 = ivl_wide(0.0), longest = ivl_wide(0.0);
     ivl_w3_t   f_foot[IVL_SIM_LEGS], centripetal[IVL_SIM_LEGS], couple[IVL_SIM_LEGS];
     row_t      rows[IVL_SIM_LEGS];
     body_wrench(model, load, &k, s->p_WB_m.z, b, rate->overlap_m);
-    hip_couples(model, &k, couple);
+    hip_couples(model, contact, &k, couple, &rate->swing_norm);
     IVL_SIM_UNROLL
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
@@ -466,10 +448,16 @@ IVL_SIM_INLINE void accelerate(const ivl_sim_model_t *model, const ivl_sim_conta
 
         // length constraint: n.(a_foot - a_hip) = -|v_rod|^2 / L - stabilisation
         rows[i] = constraint_row(model, contact, &k, i);
-        const ivl_wide_t curvature = ivl_w3_dot(k.v_rod[i], k.v_rod[i]) * (1.0 / length) + 2.0 * sigma * ivl_w3_dot(k.n[i], k.v_rod[i]) +
-                                     (0.5 * sigma * sigma / length) * (ivl_w3_dot(k.rod[i], k.rod[i]) - length * length);
+        const ivl_wide_t speed2 = ivl_w3_dot(k.v_rod[i], k.v_rod[i]);
+        const ivl_wide_t excess = ivl_w3_dot(k.rod[i], k.rod[i]) - length * length;
+        fastest2 = larger(fastest2, speed2);
+        longest = larger(longest, ivl_wide_abs(excess));
+        const ivl_wide_t curvature =
+            speed2 * (1.0 / length) + 2.0 * sigma * ivl_w3_dot(k.n[i], k.v_rod[i]) + (0.5 * sigma * sigma / length) * excess;
         r[i] = curvature + inv_mass * ivl_w3_dot(k.n[i], along_ceiling(sliding, k.up, f_foot[i])) - ivl_w3_dot(rows[i].g, centripetal[i]);
     }
+    rate->turn2_per_s2 = fastest2 * (1.0 / (length * length));
+    rate->stretch_norm = longest * (0.5 / (length * length));
     const ivl_wide_t *inverse6 = contact->inverse_mass6;
     ivl_wide_t        rebuilt[IVL_SIM_PACKED];
     if (contact->any_sliding)

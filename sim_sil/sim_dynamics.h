@@ -9,6 +9,14 @@
 
 #include "sim_model.h"
 
+/// Stabilisation of the length constraints: their error decays at this rate.  It only removes what truncation and rounding
+/// leave; the motion does not depend on it.                                                        [MODEL eq. 4.7]
+#define IVL_SIM_STABILISATION_PER_S 150.0
+
+/// Near +-90 degrees sideways the first hinge's axis falls into the rod (gimbal lock of the universal joint): its lever arm
+/// cos(beta) is kept above this value.
+#define IVL_SIM_COS_SIDEWAYS_MIN 0.05
+
 /// State of eight vehicles; W world axes, B body axes.
 typedef struct
 {
@@ -67,6 +75,9 @@ typedef struct
     ivl_w3_t   a_foot_W_mps2[IVL_SIM_LEGS];
     ivl_wide_t pull_N[IVL_SIM_LEGS];       ///< pull of a held foot away from the ceiling; < 0 presses
     ivl_wide_t overlap_m[IVL_SIM_PLATES];  ///< highest point of a plate above the ceiling; > 0 presses
+    ivl_wide_t swing_norm;                 ///< inverse inertia of the fastest swing of a leg, over that of a free leg at rest
+    ivl_wide_t turn2_per_s2;               ///< square of the rate at which the fastest rod turns
+    ivl_wide_t stretch_norm;               ///< largest error of a rod's length, over the length
 } ivl_sim_rate_t;
 
 void ivl_sim_lane_get(const ivl_sim_state_t *state, int lane, ivl_sim_kin_t *kin);

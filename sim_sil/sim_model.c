@@ -3,6 +3,8 @@
 
 #include <stdio.h>
 
+#include "sim_step.h"
+
 typedef struct
 {
     const char *name, *unit;
@@ -185,5 +187,5 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
                  raw->sense_gyro_cutoff_hz, raw->sense_accel_cutoff_hz, 0.5 * rate);
         return false;
     }
-    return true;
+    return ivl_sim_step_derive(model, error, error_size);
 }

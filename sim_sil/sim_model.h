@@ -47,6 +47,20 @@ typedef struct
     double   moment_pivot_kgm2;         ///< moment of inertia about the hip
 } ivl_sim_leg_model_t;
 
+/// What bounds an integration step: the fastest motion of the vehicle, by its rate of damping g and its frequency w.
+typedef struct
+{
+    double swing_damping_per_s;   ///< g of the fastest swing of a free leg, near rest                 [MODEL eq. 7.7]
+    double swing_quarter_per_s2;  ///< w^2 / 4 of it
+    double stuck_norm;            ///< share of these that a leg with a stuck foot has, at most
+    double damping_per_s;         ///< g of what is slower: drag, joints of stuck feet                 [MODEL eq. 7.9]
+    double drift_per_s2;          ///< bound of (dt w)^2 (w^2 + swing^2) for a rod that turns at w        [MODEL eq. 7.10]
+    double longest_s;             ///< at which the stabilisation of the rods' lengths is stable
+    double shortest_s;            ///< no step is chosen shorter than this, but for those that end at an event
+    double evaluations_per_s;     ///< evaluations of the forces that a second of motion may take,
+    double evaluations_at_once;   ///< and those that any motion may take on top, for what happens at one instant
+} ivl_sim_step_limits_t;
+
 /// Second-order low-pass: y = b0 x0 + b1 x1 + b2 x2 - a0 y1 - a1 y2.
 typedef struct
 {
@@ -59,18 +73,19 @@ typedef struct
     ivl_sim_params_t    raw;
     ivl_sim_leg_model_t leg;
     ivl_sim_plate_t     plate[IVL_SIM_PLATES];
-    double            rotor_x_m[IVL_SIM_MOTORS], rotor_y_m[IVL_SIM_MOTORS], rotor_spin[IVL_SIM_MOTORS];  ///< spin: sign of the torque on B
-    double            mass_total_kg;
-    double            rotor_speed_max_radps;
-    double            rotor_speed_hover_radps;
-    double            leg_frequency_radps;  ///< of a leg swinging about its hip, body held
-    double            leg_damping_ratio;
-    double            reach_m;  ///< largest distance of any point of the vehicle from the body origin
-    ivl_cfg_t         firmware;
-    double            tick_s;  ///< of the firmware
-    ivl_sim_lowpass_t gyro_lowpass, accel_lowpass;
-    bool              has_readings;  ///< some sensor of one number beside the state estimate
-    ivl_sim_core_t    core;          ///< where the firmware runs
+    double rotor_x_m[IVL_SIM_MOTORS], rotor_y_m[IVL_SIM_MOTORS], rotor_spin[IVL_SIM_MOTORS];  ///< spin: sign of the torque on B
+    double mass_total_kg;
+    double rotor_speed_max_radps;
+    double rotor_speed_hover_radps;
+    double leg_frequency_radps;  ///< of a leg swinging about its hip, body held
+    double leg_damping_ratio;
+    double reach_m;  ///< largest distance of any point of the vehicle from the body origin
+    ivl_sim_step_limits_t step;
+    ivl_cfg_t             firmware;
+    double                tick_s;  ///< of the firmware
+    ivl_sim_lowpass_t     gyro_lowpass, accel_lowpass;
+    bool                  has_readings;  ///< some sensor of one number beside the state estimate
+    ivl_sim_core_t        core;          ///< where the firmware runs
 } ivl_sim_model_t;
 
 /// Checks raw parameters and derives the model.

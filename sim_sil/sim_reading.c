@@ -119,7 +119,8 @@ void ivl_sim_readings_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rn
     {
         const sensor_t     sensor = sensor_of(&model->raw, kind);
         ivl_sim_reading_t *reading = &readings[kind];
-        while (sensor.rate_hz > 0.0 && reading->next_s <= t_s + IVL_SIM_TIME_SLACK_S)
+        // a tick brings a few samples; were it more than the queue holds, the rest would wait for the next one
+        for (int i = 0; i < IVL_SIM_READING_QUEUE && sensor.rate_hz > 0.0 && reading->next_s <= t_s + IVL_SIM_TIME_SLACK_S; i++)
         {
             take(&sensor, rng, truth(model, state, a_W_mps2, t_s - reading->next_s, kind), reading);
         }

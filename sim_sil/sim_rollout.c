@@ -1,6 +1,8 @@
 #include "sim_rollout.h"
 
-static const char *const END_NAMES[] = {"contact_time", "missed", "missed_time", "time_max", "refused", "not_finite"};
+#include "sim_step.h"
+
+static const char *const END_NAMES[] = {"contact_time", "missed", "missed_time", "time_max", "refused", "not_finite", "step_limit"};
 _Static_assert(sizeof END_NAMES / sizeof END_NAMES[0] == IVL_SIM_END_COUNT, "a name for each end");
 
 static const double QUATERNION_SLACK = 1.0e-3;  // of the squared length of a stated attitude
@@ -189,6 +191,11 @@ static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_
         *end = IVL_SIM_END_NOT_FINITE;
         return true;
     }
+    if (world->gave_up || world->n_evaluation >= IVL_SIM_EVALUATIONS_MAX)
+    {
+        *end = IVL_SIM_END_STEP_LIMIT;
+        return true;
+    }
     if (world->impact.happened)
     {
         *end = IVL_SIM_END_CONTACT_TIME;
@@ -359,6 +366,7 @@ void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *co
     }
     while (any)
     {
+        // ends: a tick takes a bounded number of steps, time counts ticks, and a landing ends by its time at the latest
         ivl_sim_group_step(&group);
         any = false;
         for (int lane = 0; lane < IVL_SIM_LANES; lane++)

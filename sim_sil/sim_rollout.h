@@ -22,6 +22,7 @@ typedef enum
     IVL_SIM_END_TIME_MAX,      ///< end.time_max after the start
     IVL_SIM_END_REFUSED,       ///< the flight core refused the policy
     IVL_SIM_END_NOT_FINITE,    ///< the state ceased to be finite: a defect, or absurd parameters
+    IVL_SIM_END_STEP_LIMIT,    ///< the motion took more work than any landing needs: a defect, or absurd parameters
     IVL_SIM_END_COUNT
 } ivl_sim_end_t;
 

@@ -98,12 +98,12 @@ void ivl_sim_sensors_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng
     sensors->n_tick = 0;
     // begin early enough that the first sample has been delivered at t = 0
     sensors->next_s = phase - period;
-    while (sensors->next_s + model->raw.sense_latency_s > 0.0)
+    for (int i = 0; i < IVL_SIM_POSE_QUEUE && sensors->next_s + model->raw.sense_latency_s > 0.0; i++)
     {
         sensors->next_s -= period;
     }
     memcpy(sensors->v_last_W_mps, state->v_WB_mps, sizeof sensors->v_last_W_mps);
-    while (sensors->next_s <= 0.0)
+    for (int i = 0; i < IVL_SIM_POSE_QUEUE && sensors->next_s <= 0.0; i++)
     {
         take_pose(model, rng, state, still, -sensors->next_s, sensors);
     }
@@ -199,7 +199,8 @@ void ivl_sim_sensors_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng
                           double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in)
 {
     double gyro[3], accel[3];
-    while (sensors->next_s <= t_s + IVL_SIM_TIME_SLACK_S)
+    // a tick brings a few samples; were it more than the queue holds, the rest would wait for the next one
+    for (int i = 0; i < IVL_SIM_POSE_QUEUE && sensors->next_s <= t_s + IVL_SIM_TIME_SLACK_S; i++)
     {
         take_pose(model, rng, state, a_W_mps2, t_s - sensors->next_s, sensors);
     }

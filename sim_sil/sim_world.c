@@ -1,18 +1,23 @@
 #include "sim_world.h"
 
+#include "sim_step.h"
+
 // A contact event is located to within these distances; at 1 m/s that is 0.1 us for a foot.
 static const double FOOT_TOLERANCE_M = 1.0e-7;
 static const double PLATE_TOLERANCE_M = 1.0e-6;
 // A foot that came off must move this far away before it can stick again.
 static const double REARM_GAP_M = 1.0e-3;
-// A contact that is not located after so many tries is taken where it is: the try before was within a few tolerances.
-static const int    LOCATE_MAX = 12;
 static const double NEAR_MARGIN_M = 0.05;  // more than a vehicle moves in one step
 static const double FAR_M = 1.0;           // stands for the gap of what cannot make an event
 static const double NO_EVENT = 2.0;        // share of a step, beyond its end
 static const double TIME_SLACK_S = 1.0e-9;
-static const double LEAST_V = 0.01;    // a drawn voltage stays above that of a supply that never sags
-static const double TURNS_MAX = 16.0;  // what the limit on a step's turn can shorten it by
+static const double LEAST_V = 0.01;        // a drawn voltage stays above that of a supply that never sags
+static const double STILL_RADPS = 20.0;  // a body that turns slower than this is not looked at closely
+
+static double smaller(double a, double b)
+{
+    return (a < b) ? a : b;
+}
 
 // ---- starting -----------------------------------------------------------------------------------------------------------
 
@@ -81,6 +86,7 @@ void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *
     ivl_sim_world_t *w = &group->world[lane];
     ivl_sim_lane_set(&group->state, lane, kin);
     w->restart = true;
+    w->gave_up = false;
     w->d_min_m = w->model->raw.world_ceiling_height_m - kin->p_WB_m[2];
 }
 
@@ -142,7 +148,8 @@ void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rn
     memset(&w->firmware, 0, sizeof *w - offsetof(ivl_sim_world_t, firmware));
     w->model = model;
     w->rng = *rng;
-    w->step_s = model->raw.step_flight_s * model->raw.step_scale_norm;
+    w->graded_s = model->raw.step_flight_s * model->raw.step_scale_norm;
+    w->step_s = w->graded_s;
     ivl_sim_contact_set(model, &group->contact, lane, w->foot);
     ivl_sim_rotor_init(model, &w->rotor);
     memcpy(w->rotor.speed_radps, start->rotor_radps, sizeof w->rotor.speed_radps);
@@ -174,6 +181,7 @@ void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane)
     w->t_s = 0.0;
     w->n_tick = 1;
     w->n_step = 0;
+    w->n_evaluation = 0;
     w->n_order = 0;
     w->impact = (ivl_sim_impact_t){.happened = false};
     memset(w->plate_touched, 0, sizeof w->plate_touched);
@@ -298,7 +306,7 @@ static void stop_held_feet(ivl_sim_group_t *group, int lane)
 static double longest_step(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
-    const double            most = w->impact.happened ? raw->step_swing_s : raw->step_flight_s;
+    const double            most = smaller(w->impact.happened ? raw->step_swing_s : raw->step_flight_s, w->model->step.longest_s);
     if (ivl_sim_world_count_stuck(w) < IVL_SIM_LEGS)
     {
         return most;
@@ -310,15 +318,29 @@ static double longest_step(const ivl_sim_world_t *w, const ivl_sim_state_t *s, i
         return most;
     }
     const double turns = sqrt(square) / raw->step_turn_rad;
-    return most / ((turns < TURNS_MAX) ? turns : TURNS_MAX);
+    return most / ((turns < IVL_SIM_TURNS_MAX) ? turns : IVL_SIM_TURNS_MAX);
 }
 
-static void grade_step(ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, bool event)
+/// After an event the motion begins anew, with a short step; from there it grows.
+static void restart_step(ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane)
+{
+    const double scale = w->model->raw.step_scale_norm;
+    w->graded_s = smaller(w->model->raw.step_touch_s * scale, longest_step(w, s, lane) * scale);
+    w->step_s = w->graded_s;
+}
+
+static ivl_sim_pace_t pace_of(const ivl_sim_rate_t *rate, int lane)
+{
+    return (ivl_sim_pace_t){rate->swing_norm[lane], rate->turn2_per_s2[lane], rate->stretch_norm[lane]};
+}
+
+/// Grows, up to what is accurate; and no longer than the legs allow at present.
+static void grow_step(ivl_sim_world_t *w, const ivl_sim_state_t *s, const ivl_sim_rate_t *rate, int lane)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
-    const double            most = longest_step(w, s, lane) * raw->step_scale_norm;
-    const double            next = event ? raw->step_touch_s * raw->step_scale_norm : w->step_s * raw->step_growth_norm;
-    w->step_s = (next < most) ? next : most;
+    w->graded_s = smaller(w->graded_s * raw->step_growth_norm, longest_step(w, s, lane) * raw->step_scale_norm);
+    const ivl_sim_pace_t pace = pace_of(rate, lane);
+    w->step_s = ivl_sim_step_longest(&w->model->step, &pace, w->graded_s);
 }
 
 /// Feet and plates that have arrived at the ceiling.  Feet that arrive together are stopped together.
@@ -355,7 +377,7 @@ static void handle_touches(ivl_sim_group_t *group, int lane, const double gap[IV
     }
     if (event)
     {
-        grade_step(w, &group->state, lane, true);
+        restart_step(w, &group->state, lane);
     }
 }
 
@@ -389,7 +411,7 @@ static bool handle_held(ivl_sim_group_t *group, int lane)
     }
     if (event)
     {
-        grade_step(w, &group->state, lane, true);
+        restart_step(w, &group->state, lane);
     }
     return event;
 }
@@ -461,6 +483,36 @@ static void begin_step(ivl_sim_group_t *group, int lane)
     propose(group, lane, w->trial.starting ? 0.0 : choose_step(w, plates_press(&group->last, lane), group->contact.any_sliding));
 }
 
+/// Four stuck feet hold the body redundantly.  Where two of these constraints nearly coincide the forces change with the rates
+/// faster than any step that is accurate elsewhere follows: a prediction of the body's rate that is off by more than half
+/// of it is one to try again from.
+static bool mispredicted(const ivl_sim_group_t *group, int lane)
+{
+    if (ivl_sim_world_count_stuck(&group->world[lane]) < IVL_SIM_LEGS)
+    {
+        return false;
+    }
+    const ivl_w3_t *met = &group->rate.alpha_B_radps2, *last = &group->last.alpha_B_radps2, *w = &group->state.w_B_radps;
+    const ivl_d3_t  change = ivl_d3(met->x[lane] - last->x[lane], met->y[lane] - last->y[lane], met->z[lane] - last->z[lane]);
+    const ivl_d3_t  rate = ivl_d3(w->x[lane], w->y[lane], w->z[lane]);
+    const double    dt = group->world[lane].trial.dt_s;
+    return dt * dt * ivl_d3_dot(change, change) > ivl_d3_dot(rate, rate) + STILL_RADPS * STILL_RADPS;
+}
+
+/// Longest step that the forces which the tried one has met allow.
+static double longest_retry(const ivl_sim_group_t *group, int lane)
+{
+    const ivl_sim_world_t *w = &group->world[lane];
+    const ivl_sim_pace_t   pace = pace_of(&group->rate, lane);
+    const double           tried = w->trial.dt_s;
+    double                 most = plates_press(&group->rate, lane) ? choose_step(w, true, group->contact.any_sliding) : tried;
+    if (!ivl_sim_step_allowed(&w->model->step, &pace, IVL_SIM_TRIED_MORE, tried))
+    {
+        most = smaller(most, ivl_sim_step_longest(&w->model->step, &pace, tried));
+    }
+    return mispredicted(group, lane) ? smaller(most, 0.5 * tried) : most;
+}
+
 /// Looks at the step that was tried.
 /// @return true if it stands; if not, another has been proposed
 static bool judge(ivl_sim_group_t *group, int lane)
@@ -471,12 +523,14 @@ static bool judge(ivl_sim_group_t *group, int lane)
         w->trial.n_try = 0;  // the forces have jumped: begin again from here
         return false;
     }
-    if (w->trial.starting)
+    if (w->trial.starting || w->trial.n_try >= IVL_SIM_RETRIES_MAX)
     {
         return true;
     }
-    const double most = plates_press(&group->rate, lane) ? choose_step(w, true, group->contact.any_sliding) : w->trial.dt_s;
-    const double share = (w->trial.n_try < LOCATE_MAX) ? event_share(group, lane) : NO_EVENT;
+    const double most = longest_retry(group, lane);
+    // where a motion that is none meets the ceiling says nothing, and to step there would take for ever
+    const bool   locate = w->trial.n_try < IVL_SIM_LOCATE_MAX && !ivl_sim_world_diverged(&group->next, lane);
+    const double share = locate ? event_share(group, lane) : NO_EVENT;
     const double dt = (share < 1.0) ? share * w->trial.dt_s : w->trial.dt_s;
     if (dt < w->trial.dt_s || most < w->trial.dt_s - TIME_SLACK_S)
     {
@@ -510,11 +564,11 @@ static void accept(ivl_sim_group_t *group, int lane)
     w->n_step++;
     if (ivl_sim_world_diverged(&group->next, lane))
     {
-        w->left_s = 0.0;  // steps towards its contacts would shrink for ever: the tick ends here, and with it the landing
+        w->left_s = 0.0;  // the tick ends here, and with it the landing
     }
     const double d = w->model->raw.world_ceiling_height_m - group->next.p_WB_m.z[lane];
     w->d_min_m = (d < w->d_min_m) ? d : w->d_min_m;
-    grade_step(w, &group->next, lane, false);
+    grow_step(w, &group->next, &group->rate, lane);
 }
 
 /// One lane of a struct that is made of wide numbers only.
@@ -557,12 +611,40 @@ bool ivl_sim_world_ready(const ivl_sim_group_t *group, int lane)
     return !(group->world[lane].left_s > TIME_SLACK_S);
 }
 
+static void set_due(ivl_sim_world_t *w, double span_s)
+{
+    w->left_s = span_s;
+    w->evaluations_left = ivl_sim_step_evaluations(&w->model->step, span_s);
+}
+
+/// True if a world has motion to do and may take one more evaluation for it.  This bounds every loop of steps: no tick takes
+/// more evaluations than it was given, whatever the vehicle and its state.
+static bool may_move(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t *w = &group->world[lane];
+    if (!group->active[lane] || ivl_sim_world_ready(group, lane))
+    {
+        return false;
+    }
+    if (w->evaluations_left == 0)
+    {
+        w->gave_up = true;
+        w->left_s = 0.0;
+        w->restart = true;
+        w->trial.n_try = 0;
+        return false;
+    }
+    w->evaluations_left--;
+    w->n_evaluation++;
+    return true;
+}
+
 void ivl_sim_group_step(ivl_sim_group_t *group)
 {
     bool stands[IVL_SIM_LANES], moving[IVL_SIM_LANES];
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        moving[lane] = group->active[lane] && !ivl_sim_world_ready(group, lane);
+        moving[lane] = may_move(group, lane);
         if (!moving[lane])
         {
             group->dt_s[lane] = 0.0;
@@ -601,7 +683,10 @@ void ivl_sim_group_advance(ivl_sim_group_t *group, double dt_s)
 {
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        group->world[lane].left_s = dt_s;
+        if (group->active[lane])
+        {
+            set_due(&group->world[lane], dt_s);
+        }
     }
     while (!all_ready(group))
     {
@@ -627,7 +712,7 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
     // time is a count of ticks, so that it does not drift
     w->t_s = (double)w->n_tick * model->tick_s;
     w->n_tick++;
-    w->left_s = (double)w->n_tick * model->tick_s - w->t_s;
+    set_due(w, (double)w->n_tick * model->tick_s - w->t_s);
     if (model->core.every_tick || !ivl_motors_latched_off(&w->firmware))
     {
         ivl_sim_kin_t kin;  // of which sensors need the body's part

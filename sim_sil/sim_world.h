@@ -42,8 +42,12 @@ typedef struct
     double                 left_s;                         ///< of the present tick
     uint32_t               n_tick;                         ///< ticks of the flight core since the start
     uint32_t               n_step;                         ///< integration steps since the start
+    uint32_t               n_evaluation;                   ///< evaluations of the forces since the start: steps and tries
+    uint32_t               evaluations_left;               ///< of the present tick
+    bool                   gave_up;                        ///< a tick took more than it can have: what follows is no motion
     uint32_t               n_approach_tick, n_valid_tick;  ///< ticks of the approach, and those with a valid distance
-    double                 step_s;                         ///< next integration step, graded after events
+    double                 graded_s;                       ///< next integration step, graded after events
+    double                 step_s;                         ///< the same, or what the legs allow if that is shorter
     bool                   restart;                        ///< the forces have jumped since the last evaluation
     ivl_sim_foot_t         foot[IVL_SIM_LEGS];
     ivl_sim_trial_t        trial;
@@ -111,10 +115,12 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane);
 /// True when the motion that was due is done: the next tick can begin.
 bool ivl_sim_world_ready(const ivl_sim_group_t *group, int lane);
 
-/// One integration step of every active world that is not ready.
+/// One integration step, or one try of it, of every active world that is not ready.  After so many of them each world is ready
+/// or has given up, which makes it ready, too.
 void ivl_sim_group_step(ivl_sim_group_t *group);
 
-/// Motion alone, for dt, with the rotor commands as they are; of all active worlds.
+/// Motion alone, for dt, with the rotor commands as they are; of all active worlds.  A world that takes more evaluations than
+/// such a motion can need gives up: it stays where it is, and `gave_up` says so.
 void ivl_sim_group_advance(ivl_sim_group_t *group, double dt_s);
 
 /// True for a motion that is no longer one: not finite, or faster than anything that flies.

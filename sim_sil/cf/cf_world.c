@@ -107,7 +107,7 @@ static void rest(ivl_cf_t *cf)
     cf->grounded = !(load.thrust_N * R.row[2].z > cf->model.mass_total_kg * cf->model.raw.world_gravity_mps2);
 }
 
-/// The motion that has been due since the last tick.
+/// The motion that has been due since the last tick.  The world bounds the steps that this takes.
 static void move(ivl_cf_t *cf)
 {
     if (cf->grounded)
@@ -129,7 +129,7 @@ static void find_floor(ivl_cf_t *cf)
     {
         return;
     }
-    if (ivl_sim_world_diverged(&cf->group.state, IVL_CF_LANE))
+    if (ivl_sim_world_diverged(&cf->group.state, IVL_CF_LANE) || ivl_cf_world(cf)->gave_up)
     {
         place_on_floor(cf, (double)cf->set.start_x_m, (double)cf->set.start_y_m, level);
     }

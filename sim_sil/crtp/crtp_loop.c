@@ -188,9 +188,13 @@ static void serve_control(ivl_crtp_loop_t *loop)
     {
         return;
     }
-    ivl_crtp_udp_event_t event;
-    while ((event = ivl_crtp_udp_take(loop->control_fd, request, sizeof request, &size, &peer)) != IVL_CRTP_UDP_NOTHING)
+    for (int i = 0; i < PACKETS_A_TURN; i++)
     {
+        const ivl_crtp_udp_event_t event = ivl_crtp_udp_take(loop->control_fd, request, sizeof request, &size, &peer);
+        if (event == IVL_CRTP_UDP_NOTHING)
+        {
+            return;
+        }
         if (event == IVL_CRTP_UDP_PACKET)
         {
             ivl_crtp_control(&loop->crtp, (const char *)request, (size > sizeof request) ? 0u : size, reply);
