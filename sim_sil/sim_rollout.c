@@ -44,15 +44,15 @@ static void level_start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec
 }
 
 /// The state that the specification gives.
-/// @return false if its quaternion is none, or the body is not below the ceiling
-static bool stated_start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_start_state_t *start)
+/// @return false if its quaternion is none
+static bool stated_start(const ivl_sim_spec_t *spec, ivl_sim_start_state_t *start)
 {
     double square = 0.0;
     for (int i = 0; i < 4; i++)
     {
         square += spec->q_start_WB[i] * spec->q_start_WB[i];
     }
-    if (!(fabs(square - 1.0) < QUATERNION_SLACK) || !(spec->p_start_W_m[2] < model->raw.world_ceiling_height_m))
+    if (!(fabs(square - 1.0) < QUATERNION_SLACK))
     {
         return false;
     }
@@ -76,6 +76,25 @@ static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], 
     cmd->angle_rad = (float)(spec->angle_deg[0] * (IVL_SIM_PI / 180.0));
 }
 
+/// True if some part of the vehicle reaches beyond the ceiling: no landing can begin there.
+static bool behind_ceiling(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
+{
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    const ivl_d3_t  up = ivl_d3(R.row[2].x, R.row[2].y, R.row[2].z);
+    double          top = kin->p_WB_m[2];
+    for (int i = 0; i < IVL_SIM_PLATES; i++)
+    {
+        const double plate = kin->p_WB_m[2] + ivl_sim_plate_top(&model->plate[i], up);
+        top = (plate > top) ? plate : top;
+    }
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const double foot = kin->p_foot_W_m[i][2] + model->raw.leg_foot_radius_m;
+        top = (foot > top) ? foot : top;
+    }
+    return !(top < model->raw.world_ceiling_height_m);
+}
+
 bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec)
 {
     const ivl_sim_model_t *model = group->model;
@@ -91,11 +110,16 @@ bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_
     {
         level_start(model, spec, &start);
     }
-    else if (!stated_start(model, spec, &start))
+    else if (!stated_start(spec, &start))
     {
         return false;
     }
     ivl_sim_world_start_from(group, lane, &rng, &start);
+    const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
+    if (behind_ceiling(model, &kin))
+    {
+        return false;
+    }
     request_approach(spec, start.p_W_m, &world->in.cmd);
     const bool         at_once = spec->start[0] == IVL_SIM_START_AT_TRIGGER;
     const ivl_policy_t policy = {
