@@ -263,8 +263,8 @@ class World:
         """Hover from set-point to set-point, without a landing.
 
         Args:
-            setpoints: Time (s) from which each holds, the first from 0 on, and position (m), shape (..., n, 4). A flight
-                starts at its first one, level and at rest, with rotors at hover.
+            setpoints: Time (s) from which each holds, the first from 0 on, and position (m), shape (..., n, 4). A
+                flight starts at its first one, level and at rest, with rotors at hover.
             duration_s: Length of each flight, s.
             seed: Seed of the random numbers.
             stream: Number of each flight within the seed, shape (...); omitted: the flat index in this call.
