@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "sim_hover.h"
 #include "sim_replay.h"
 #include "sim_rollout.h"
 
@@ -253,6 +254,30 @@ int ivl_sil_replay(const void *model, const void *config, float rrev_c_per_s, fl
 {
     const ivl_policy_t policy = {.seq = 1, .rrev_c_per_s = rrev_c_per_s, .moment_y_Nm = moment_y_Nm};
     return (int)ivl_sim_replay(model, config, &policy, inputs, n, rows);
+}
+
+int ivl_sil_hover(const void *model, const double *setpoints, size_t n_setpoints, const uint64_t *seeds, size_t n, double period_s,
+                  void *rows, size_t n_rows)
+{
+    ivl_sim_setpoint_t *setpoint = calloc(n * n_setpoints + 1, sizeof *setpoint);
+    ivl_sim_hover_t    *flight = calloc(n + 1, sizeof *flight);
+    const bool          good = setpoint && flight && period_s > 0.0 && n_rows > 0 && n_setpoints > 0;
+    for (size_t i = 0; good && i < n * n_setpoints; i++)
+    {
+        setpoint[i] = (ivl_sim_setpoint_t){setpoints[4 * i], {setpoints[4 * i + 1], setpoints[4 * i + 2], setpoints[4 * i + 3]}};
+    }
+    for (size_t i = 0; good && i < n; i++)
+    {
+        flight[i] = (ivl_sim_hover_t){
+            {seeds[2 * i], seeds[2 * i + 1]}, &setpoint[i * n_setpoints], n_setpoints, (ivl_sim_trace_t *)rows + i * n_rows};
+    }
+    if (good)
+    {
+        ivl_sim_hover(model, flight, n, period_s, n_rows);
+    }
+    free(setpoint);
+    free(flight);
+    return good ? 0 : -1;
 }
 
 const char *ivl_sil_end_reason(int code)

@@ -63,6 +63,13 @@ long ivl_sil_trace(const void *model, const void *spec, double period_s, void *r
 /// @return 0; 1 if the core refuses the configuration, 2 if it refuses the policy
 int ivl_sil_replay(const void *model, const void *config, float rrev_c_per_s, float moment_y_Nm, const void *inputs, size_t n, void *rows);
 
+/// Flies n hovers, each through n_setpoints set-points of four numbers: time from which it holds (s), position (m).  A flight starts at its
+/// first set-point and has n_rows rows of IVL_SIL_TABLE_TRACE, one each period.
+/// @param[in] seeds  seed and stream of each flight
+/// @return 0; -1 if the period is not positive, or there are no rows or no set-points
+int ivl_sil_hover(const void *model, const double *setpoints, size_t n_setpoints, const uint64_t *seeds, size_t n, double period_s,
+                  void *rows, size_t n_rows);
+
 const char *ivl_sil_end_reason(int code);
 const char *ivl_sil_phase_name(int code);
 

@@ -244,9 +244,12 @@ static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_
     return out_of_reach(world->model, &kin);
 }
 
-static void write_row(const ivl_sim_world_t *w, const ivl_sim_kin_t *kin, ivl_sim_trace_t *row)
+void ivl_sim_rollout_row(const ivl_sim_group_t *group, int lane, ivl_sim_trace_t *row)
 {
+    const ivl_sim_world_t *w = &group->world[lane];
     const ivl_sim_model_t *model = w->model;
+    const ivl_sim_kin_t    body = ivl_sim_world_kin(group, lane), *kin = &body;
+    memset(row, 0, sizeof *row);
     row->t_s[0] = w->t_s;
     memcpy(row->p_WB_m, kin->p_WB_m, sizeof row->p_WB_m);
     memcpy(row->q_WB, kin->q_WB, sizeof row->q_WB);
@@ -288,9 +291,7 @@ static void trace(ivl_sim_tracer_t *tracer, const ivl_sim_group_t *group, int la
     }
     if (tracer->n < tracer->capacity)
     {
-        const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
-        memset(&tracer->rows[tracer->n], 0, sizeof tracer->rows[0]);
-        write_row(world, &kin, &tracer->rows[tracer->n]);
+        ivl_sim_rollout_row(group, lane, &tracer->rows[tracer->n]);
     }
     tracer->n++;
 }

@@ -150,6 +150,9 @@ void ivl_sim_rollout_note(const ivl_sim_group_t *group, int lane, ivl_sim_outcom
 /// Between two ticks: true if the landing is over, and then the outcome is complete.
 bool ivl_sim_rollout_ended(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *outcome);
 
+/// One row of a time series: the present instant, and what the core did at its last tick.
+void ivl_sim_rollout_row(const ivl_sim_group_t *group, int lane, ivl_sim_trace_t *row);
+
 /// Lower-case name of an end, "?" for a number that is none.
 const char *ivl_sim_end_name(int end);
 

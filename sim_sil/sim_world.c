@@ -130,6 +130,17 @@ static void turn_legs(ivl_sim_kin_t *kin)
     }
 }
 
+/// Accelerations of the vehicle that was in this lane before must not reach the new one: what is no number would, even through a step of
+/// no length.
+static void forget_rates(ivl_sim_group_t *group, int lane)
+{
+    double *last = (double *)&group->last;
+    for (size_t i = (size_t)lane; i < sizeof group->last / sizeof *last; i += IVL_SIM_LANES)
+    {
+        last[i] = 0.0;
+    }
+}
+
 void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const ivl_sim_start_state_t *start)
 {
     const ivl_sim_model_t *model = group->model;
@@ -158,6 +169,7 @@ void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rn
     draw_battery(w, start->battery_V);
     ivl_sim_sensors_init(model, rng, &kin, &w->sensors);
     model->core.init(group->port, lane, &model->firmware, &w->firmware);
+    forget_rates(group, lane);
     ivl_sim_world_place(group, lane, &kin);
     group->active[lane] = true;
 }

@@ -244,6 +244,40 @@ class NativeModel:
             raise NativeError(f"the native trace failed with status {n_rows}")
         return n_rows
 
+    def hovers(
+        self,
+        setpoints: npt.NDArray[np.float64],
+        seeds: npt.NDArray[np.uint64],
+        period_s: float,
+        n_rows: int,
+    ) -> npt.NDArray[np.void]:
+        """Hover from set-point to set-point.
+
+        Args:
+            setpoints: Time (s) from which each holds and position (m), shape (n, n_setpoints, 4).
+            seeds: Seed and stream of each flight, shape (n, 2).
+            period_s: Time between two rows.
+            n_rows: Rows of each flight.
+
+        Returns:
+            Rows of `trace_dtype`, shape (n, n_rows).
+        """
+        setpoints = np.ascontiguousarray(setpoints, dtype=np.float64)
+        seeds = np.ascontiguousarray(seeds, dtype=np.uint64)
+        n, n_setpoints = setpoints.shape[:2]
+        if setpoints.shape[2:] != (4,) or seeds.shape != (n, 2):
+            raise NativeError(
+                f"set-points of shape {setpoints.shape} and seeds of shape {seeds.shape}: not one flight each"
+            )
+        rows = np.zeros((n, n_rows), dtype=self._library.trace_dtype)
+        call = self._library._c.ivl_sil_hover
+        status = call(
+            self._handle, _pointer(setpoints), n_setpoints, _pointer(seeds), n, period_s, _pointer(rows), n_rows
+        )
+        if status != 0:
+            raise NativeError(f"the native hover of {n} flights failed with status {status}")
+        return rows
+
 
 @cache
 def library() -> NativeLibrary:
@@ -263,6 +297,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_replay", c_int, (ptr, ptr, ctypes.c_float, ctypes.c_float, ptr, size, ptr)),
+        ("ivl_sil_hover", c_int, (ptr, ptr, size, ptr, size, double, ptr, size)),
         ("ivl_sil_end_reason", ctypes.c_char_p, (c_int,)),
         ("ivl_sil_rule_name", ctypes.c_char_p, (c_int,)),
         ("ivl_sil_layout", ctypes.POINTER(_CField), (c_int, u32p, u32p)),

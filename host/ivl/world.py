@@ -23,6 +23,7 @@ _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within se
 _SEED_MAX = 2**64 - 1
 _THREADS_MAX = 256
 _QUATERNION_SLACK = 4e-4
+_HOVER_S_MAX, _HOVER_M_MAX = 600.0, 100.0
 
 FloatArray = npt.NDArray[np.float64]
 FloatLike = npt.ArrayLike
@@ -250,6 +251,62 @@ class World:
             raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
         rows, outcome = self._native.trace(specs, period_s)
         return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
+
+    def hover(
+        self,
+        setpoints: npt.ArrayLike,
+        duration_s: float,
+        seed: npt.ArrayLike = 0,
+        stream: npt.ArrayLike | None = None,
+        period_s: float = 0.01,
+    ) -> np.recarray[Any, Any]:
+        """Hover from set-point to set-point, without a landing.
+
+        Args:
+            setpoints: Time (s) from which each holds, the first from 0 on, and position (m), shape (..., n, 4). A
+                flight starts at its first one, level and at rest, with rotors at hover.
+            duration_s: Length of each flight, s.
+            seed: Seed of the random numbers.
+            stream: Number of each flight within the seed, shape (...); omitted: the flat index in this call.
+            period_s: Time between two rows, s; at least a tick of the flight core.
+
+        Returns:
+            Rows of the library's trace table, shape (..., n_rows); rows after a motion that diverged have the time NaN.
+
+        Raises:
+            ArgumentError: An argument is not finite, out of range, or of the wrong shape.
+        """
+        points = self._setpoints(setpoints)
+        tick_s = float(self._native.derived()[0]["tick_s"])
+        for name, value, least, most in (
+            ("duration_s", duration_s, tick_s, _HOVER_S_MAX), ("period_s", period_s, tick_s, 1.0),
+        ):  # fmt: skip
+            if not least * (1.0 - 1e-9) <= value <= most:
+                raise ArgumentError(f"{name}: value {value!r} is out of range (allowed {least:g} .. {most:g} s)")
+        shape = points.shape[:-2]
+        streams = np.arange(np.prod(shape, dtype=np.int64)).reshape(shape) if stream is None else stream
+        numbers = [_numbers("seed", seed), _numbers("stream", streams)]
+        try:
+            seeds = np.stack([np.broadcast_to(array, shape).reshape(-1) for array in numbers], axis=1)
+        except ValueError as error:
+            raise ArgumentError(f"seed, stream: do not broadcast to {shape}, the shape of the flights") from error
+        n_rows = round(duration_s / period_s) + 1
+        rows = self._native.hovers(points.reshape(-1, *points.shape[-2:]), seeds, period_s, n_rows)
+        return rows.reshape(*shape, n_rows).view(np.recarray)
+
+    def _setpoints(self, setpoints: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Checked set-points of hovers, shape (..., n, 4)."""
+        points = _numbers("setpoints", setpoints)
+        if points.ndim < 2 or points.shape[-1] != 4 or points.shape[-2] == 0:
+            raise ArgumentError(f"setpoints: rows of t, x, y, z are needed, the shape is {points.shape}")
+        if not (np.isfinite(points).all() and (np.abs(points) <= _HOVER_M_MAX).all()):
+            raise ArgumentError(f"setpoints: all values must be finite and within +-{_HOVER_M_MAX:g}")
+        if (points[..., 0, 0] != 0.0).any() or (np.diff(points[..., 0]) <= 0.0).any():
+            raise ArgumentError("setpoints: the times of a flight must begin with 0 and grow")
+        ceiling_m = self.params.values["world.ceiling_height"]
+        if not (points[..., 3] < ceiling_m).all():
+            raise ArgumentError(f"setpoints: z must stay below the ceiling, {ceiling_m:g} m")
+        return points
 
     def _specs(
         self, start: str, stream: npt.ArrayLike | None, state: State | None, **arguments: npt.ArrayLike | None

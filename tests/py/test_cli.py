@@ -110,7 +110,7 @@ def test_list_names_everything(capsys: Capture) -> None:
     data = json_of(["list"], capsys)
     assert set(data) == {"vehicles", "gears", "sensors", "experiments", "learners", "rewards"}
     assert {"ideal", "mocap", "camera50", "ranger10"} <= {entry["name"] for entry in data["sensors"]}
-    assert {entry["name"] for entry in data["vehicles"]} == {"habas2021", "crazyflie21"}
+    assert {entry["name"] for entry in data["vehicles"]} == {"habas2021", "crazyflie21", "crazyflie21_brushless"}
     assert len(data["gears"]) == 12
     assert "experiments/paper_vertical.yaml" in {entry["name"] for entry in data["experiments"]}
     assert {"ephe", "ephe_robust", "cmaes", "bo"} <= {entry["name"] for entry in data["learners"]}

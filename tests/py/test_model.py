@@ -28,7 +28,7 @@ def changed_gear(tmp_path: Path, old: str, new: str) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("vehicle", ["habas2021", "crazyflie21"])
+@pytest.mark.parametrize("vehicle", model.list_vehicles())
 @pytest.mark.parametrize("gear_set", ["table1", "as_simulated"])
 @pytest.mark.parametrize("gear", GEARS)
 def test_every_shipped_combination_defines_every_parameter_once(vehicle: str, gear_set: str, gear: str) -> None:
@@ -37,7 +37,7 @@ def test_every_shipped_combination_defines_every_parameter_once(vehicle: str, ge
 
 
 def test_lists_name_what_ships() -> None:
-    assert model.list_vehicles() == ["crazyflie21", "habas2021"]
+    assert model.list_vehicles() == ["crazyflie21", "crazyflie21_brushless", "habas2021"]
     assert model.list_gear_sets() == ["as_simulated", "table1"]
     assert model.list_gears("table1") == GEARS
 

@@ -254,3 +254,59 @@ def test_states_broadcast_with_the_other_arguments() -> None:
 def test_bad_states_are_refused(start: str, state: ivl.State | None, words: str) -> None:
     with pytest.raises(ArgumentError, match=words):
         ivl.World("habas2021").rollouts(2.5, 90.0, 4.0, 6.0, start=start, state=state)
+
+
+# ---- hover -----------------------------------------------------------------------------------------------------------
+
+
+def step_of(offset_m: tuple[float, float, float]) -> np.ndarray:
+    """A hover, and a step after a second."""
+    start = np.array([0.1, -0.2, 1.5])
+    return np.array([[0.0, *start], [1.0, *(start + offset_m)]])
+
+
+def test_a_hover_flies_to_its_set_points_and_rows_tell_when() -> None:
+    world = ivl.World("habas2021")
+    rows = world.hover([step_of((0.3, 0.0, 0.0)), step_of((0.0, 0.2, -0.3))], 6.0, period_s=0.05)
+    assert rows.shape == (2, 121)
+    np.testing.assert_allclose(rows.t_s[1], np.arange(121) * 0.05, atol=1e-9)
+    np.testing.assert_allclose(rows.p_WB_m[:, 20], [[0.1, -0.2, 1.5]] * 2, atol=2e-3)
+    np.testing.assert_allclose(rows.p_WB_m[:, -1], [[0.4, -0.2, 1.5], [0.1, 0.0, 1.2]], atol=0.02)
+    assert {world.phase_name(code) for code in np.unique(rows.phase[:, 1:])} == {"ready"}
+
+
+def test_a_hover_is_the_same_alone_or_among_others_and_depends_on_seed_and_stream() -> None:
+    world = ivl.World("crazyflie21")
+    points = np.broadcast_to(step_of((0.1, 0.1, 0.1)), (2, 5, 2, 4))
+    many = world.hover(points, 2.0, seed=3)
+    assert many.shape == (2, 5, 201)
+    one = world.hover(points[0, 0], 2.0, seed=3, stream=7)
+    assert one.tobytes() == many[1, 2].tobytes()
+    assert world.hover(points[0, 0], 2.0, seed=4, stream=7).tobytes() != one.tobytes()
+    assert world.hover(points, 2.0, seed=3, stream=7)[0, 3].tobytes() == one.tobytes()
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    ({"setpoints": [0.0, 0.0, 0.0, 1.0]}, "rows of t, x, y, z are needed"),
+    ({"setpoints": [[0.0, 0.0, 1.0]]}, "rows of t, x, y, z are needed"),
+    ({"setpoints": np.zeros((3, 0, 4))}, "rows of t, x, y, z are needed"),
+    ({"setpoints": [[0.5, 0.0, 0.0, 1.0]]}, "begin with 0"),
+    ({"setpoints": [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.1]]}, "begin with 0 and grow"),
+    ({"setpoints": [[0.0, 0.0, np.nan, 1.0]]}, "must be finite"),
+    ({"setpoints": [[0.0, 0.0, 1e3, 1.0]]}, "must be finite and within"),
+    ({"setpoints": [[0.0, 0.0, 0.0, 3.0]]}, "below the ceiling, 3 m"),
+    ({"setpoints": "high"}, "is not a number"),
+    ({"duration_s": 0.0}, "duration_s: value 0.0 is out of range"),
+    ({"duration_s": np.nan}, "duration_s: value nan is out of range"),
+    ({"period_s": 0.001}, "period_s: value 0.001 is out of range"),
+    ({"seed": -1}, "must be a whole number"),
+    ({"stream": [1, 2, 3]}, "do not broadcast"),
+])  # fmt: skip
+def test_a_hover_that_is_none_is_refused(arguments: dict[str, object], words: str) -> None:
+    flight: dict[str, object] = {"setpoints": [[0.0, 0.0, 0.0, 1.0]], "duration_s": 1.0}
+    with pytest.raises(ArgumentError, match=words):
+        ivl.World("habas2021").hover(**(flight | arguments))  # type: ignore[arg-type]
+
+
+def test_no_hovers_are_no_rows() -> None:
+    assert ivl.World("habas2021").hover(np.zeros((0, 1, 4)), 1.0).shape == (0, 101)

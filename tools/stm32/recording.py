@@ -12,7 +12,7 @@ import ivl
 from ivl import native
 
 GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
-VEHICLES = ("habas2021", "crazyflie21")
+VEHICLES = ("habas2021", "crazyflie21", "crazyflie21_brushless")
 _ERROR_BYTES = 256
 _ROLLOUTS = 12  # of a batch, which has one vehicle, one gear and one set of parameters
 
