@@ -213,6 +213,10 @@ test-report: setup-dev build chromium ## reports in a real browser, exports read
 step-study: setup-dev build ## ten thousand landings with shorter and shorter steps (2 min)
 	@$(BIN)/python tests/physics/step_study.py
 
+.PHONY: ends-study
+ends-study: setup-dev build ## does every landing end? ten million of random vehicles (an hour or two)
+	@$(BIN)/python tests/physics/ends_study.py
+
 .PHONY: test-mujoco
 test-mujoco: setup-dev build ## landings compared with an independent engine
 	$(say) 'test-mujoco: pytest tests/mujoco'

@@ -14,7 +14,7 @@ from ivl import native
 from ivl.errors import NativeError
 
 FOUR_LEG_MIN = 3
-INVALID_ENDS = ("refused", "not_finite")
+INVALID_ENDS = ("refused", "not_finite", "step_limit")
 """Names of the ends after which an outcome says nothing about the policy."""
 
 BoolArray = npt.NDArray[np.bool_]

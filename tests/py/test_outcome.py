@@ -17,9 +17,10 @@ def test_three_legs_count_as_a_four_leg_landing() -> None:
     assert outcome.four_leg(outcomes([0, 1, 2, 3, 4], [0] * 5)).tolist() == [False, False, False, True, True]
 
 
-def test_a_rollout_whose_simulation_broke_down_is_no_landing() -> None:
+@pytest.mark.parametrize("end", ["refused", "not_finite", "step_limit"])
+def test_a_rollout_whose_simulation_broke_down_is_no_landing(end: str) -> None:
     records = outcomes([4, 4], [0, 0])
-    codes = [code for code in range(20) if native.library().end_reason(code) == "not_finite"]
+    codes = [code for code in range(20) if native.library().end_reason(code) == end]
     records["end_reason"][1] = codes[0]
     assert outcome.valid(records).tolist() == [True, False]
     assert outcome.four_leg(records).tolist() == [True, False]
