@@ -41,7 +41,8 @@ class State:
         q_WB: Attitude, unit quaternion x, y, z, w, shape (..., 4).
         w_B_radps: Angular rate in body axes, shape (..., 3), rad/s.
         rotor_radps: Rotor speeds M1..M4, shape (..., 4), rad/s; None: those of a hover.
-        battery_V: Open-circuit voltage of the battery, shape (...), V; None: the vehicle's own, with its scatter.
+        battery_V: Open-circuit voltage of the battery, shape (...), V; None: that of the vehicle, with its scatter. A
+            vehicle without a battery is given one by it.
     """
 
     p_W_m: npt.ArrayLike

@@ -83,6 +83,36 @@ def test_flights_that_cannot_be_compared_are_named(flights: store.Flights) -> No
         compare.compare(folder(broken), "crazyflie21", "wide_short", "table1", n=2)
 
 
+@pytest.mark.parametrize("change", [{"h_plane_m": 1.0}, {"moment_y_Nmm": 1e3}])
+def test_a_flight_that_cannot_be_flown_is_left_out_and_named(flights: store.Flights, change: dict[str, float]) -> None:
+    wrong = store.Flight({**flights[0].info, **change, "label": "wrong"}, flights[0].samples)
+    result = compare.compare(folder(flights[3], wrong), "crazyflie21", "wide_short", "table1", n=2)
+    assert len(result.rows) == 1
+    assert "flight wrong: " in result.left_out[0]
+
+
+def test_ranking_is_unknown_where_all_flights_ended_alike(
+    flights: store.Flights, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store.write(tmp_path / "one", folder(flights[3]))
+    assert cli.run(["flight", "compare", str(tmp_path / "one"), "--n", "4", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["landed_auc"] is None
+    nobody = store.Flight({**flights[3].info, "n_legs": float("nan")}, flights[3].samples)
+    store.write(tmp_path / "nobody", folder(nobody))
+    picture = tmp_path / "one.png"
+    assert cli.run(["flight", "compare", str(tmp_path / "nobody"), "--n", "4", "--plot", str(picture)]) == 0
+    assert picture.is_file()
+
+
+def test_windows_are_flown_under_the_ceiling_of_the_flights(flights: store.Flights) -> None:
+    few = flights.flights[:4]
+    spans = []
+    for gap_m in (0.0, 0.06):
+        room = folder(*(store.Flight({**f.info, "h_surface_m": f.info["h_plane_m"] - gap_m}, f.samples) for f in few))
+        spans.append(compare.compare(room, "crazyflie21", "wide_short", "table1", n=2).windows[0].rate)
+    assert np.abs(spans[0] - spans[1]).max() > 0.3
+
+
 def test_equal_seeds_give_equal_figures(flights: store.Flights) -> None:
     first, second = (
         compare.compare(folder(*flights.flights[:3]), "crazyflie21", "wide_short", "table1", n=8, seed=5).summary()
@@ -114,6 +144,7 @@ def test_command_prints_figures_and_draws(made: Path, tmp_path: Path, capsys: py
     (["--policy", "3.85"], "expected RREV_C,M_YD"), (["--plot", "a.gif"], "unknown kind of file"),
     (["--vehicle", "crazyfly"], "did you mean 'crazyflie21'"), (["--set", "sense.latency=9"], "out of range"),
     (["--set", "sense.latenzy=0.01"], "did you mean 'sense.latency'"),
+    (["--plot", "nowhere/a.png"], "the folder nowhere does not exist"),
 ])  # fmt: skip
 def test_wrong_options_are_one_line(
     made: Path, capsys: pytest.CaptureFixture[str], options: list[str], words: str

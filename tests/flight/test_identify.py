@@ -34,6 +34,44 @@ def test_known_numbers_are_found_within_their_intervals(found: identify.Identifi
     assert found.after["fitted"]["pitch_rms_deg"] < 0.6 * found.before["fitted"]["pitch_rms_deg"]
 
 
+def test_intervals_are_centred_on_the_estimates(found: identify.Identification) -> None:
+    for i, estimate in enumerate(found.estimates):
+        assert found.draws[:, i].mean() == pytest.approx(estimate.value, abs=0.5 * estimate.sigma)
+    assert abs(found.rotor_error) < 0.01
+
+
+def test_what_the_flights_do_not_see_is_not_fitted(flights: store.Flights) -> None:
+    few = folder(*flights.flights[:2])
+    with pytest.raises(ConfigError, match=r"plate\.friction: the motion of these flights does not depend on it"):
+        identify.identify(few, "crazyflie21", "wide_short", "table1", ["plate.friction"])
+
+
+def test_one_flight_tells_no_less_than_the_vehicle_file_and_nothing_impossible(flights: store.Flights) -> None:
+    names = ["rotor.tau_down", "sense.latency"]
+    result = identify.identify(folder(flights[0]), "crazyflie21", "wide_short", "table1", names)
+    for estimate in result.estimates:
+        low, high = estimate.interval
+        assert estimate.prior.lo <= low <= estimate.value <= high <= estimate.prior.hi
+        assert high - low <= 4.0 * estimate.prior.sigma
+
+
+def test_what_the_flights_measured_is_not_fitted(flights: store.Flights) -> None:
+    measured = folder(
+        *(store.Flight({**f.info, "h_surface_m": f.info["h_plane_m"] - 0.03}, f.samples) for f in flights)
+    )
+    with pytest.raises(ConfigError, match="these flights measured it"):
+        identify.identify(measured, "crazyflie21", "wide_short", "table1", ["world.sensed_gap_offset"])
+
+
+def test_what_was_held_is_in_the_vehicle_that_is_written(flights: store.Flights) -> None:
+    few = folder(*flights.flights[:3])
+    held = {"sense.latency": 0.02, "leg.stiffness": 0.1}
+    result = identify.identify(few, "crazyflie21", "wide_short", "table1", ["rotor.tau_down"], held)
+    content = identify.vehicle_file("crazyflie21", result, "test")
+    assert content["sense"]["latency"]["value"] == 0.02
+    assert "leg" not in content
+
+
 def test_outcomes_are_not_looked_at(flights: store.Flights, found: identify.Identification) -> None:
     upside_down = folder(
         *(store.Flight({**f.info, "n_legs": 4.0 - f.info["n_legs"], "reward": 1e6}, f.samples) for f in flights)
@@ -58,7 +96,7 @@ def test_what_the_flights_cannot_separate_is_said(flights: store.Flights) -> Non
     result = identify.identify(few, "crazyflie21", "wide_short", "table1", names, sigmas=sigmas)
     text = " ".join(result.words)
     assert "say little of rotor.torque_constant" in text
-    assert "2 flights are few" in text
+    assert "Few flights (2)" in text
 
 
 def test_held_out_flights_are_judged_not_fitted(flights: store.Flights) -> None:
@@ -107,12 +145,16 @@ def test_command_writes_a_vehicle_that_flies(
     (["--fit", "rotor.tau_down", "--out", "a.yaml", "--sigma", "rotor.tau_down=x"], "expected NAME=NUMBER"),
     (["--fit", "rotor.tau_down", "--out", "a.yaml", "--hold-out", "1"], "would hold out every flight"),
     (["--fit", "rotor.tau_down", "--out", "a.yaml", "--hold-out-moment", "6"], "expected LO:HI"),
+    (["--fit", "rotor.tau_down", "--out", "a.yaml", "--hold-out-moment", "9:6"], "LO must not be above HI"),
+    (["--fit", "rotor.tau_down", "--out", "a.yaml", "--sigma", "rotor.tau_dwn=0.1"], "rotor.tau_dwn: is not fitted"),
+    (["--fit", "rotor.tau_down", "--out", "nowhere/a.yaml"], "the folder nowhere does not exist"),
+    (["--fit", "world.ceiling_height", "--out", "a.yaml"], "the flights give it"),
 ])  # fmt: skip
 def test_wrong_options_are_one_line(
     flights: store.Flights, tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], words: str
 ) -> None:
     store.write(tmp_path / "made", flights)
-    options = [str(tmp_path / "out" / o) if o.startswith("a.") else o for o in options]
+    options = [str(tmp_path / o) if o.startswith("a.") else o for o in options]
     assert cli.run(["flight", "identify", str(tmp_path / "made"), *options]) == 2
     text = capsys.readouterr().err
     assert words in text

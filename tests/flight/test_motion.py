@@ -43,6 +43,25 @@ def test_another_vehicle_shows_in_the_motion(world: World, name: str, value: flo
     assert errors[1] > 2.0 * errors[0]
 
 
+def test_a_vehicle_without_a_battery_gets_none_from_a_recording(world: World) -> None:
+    flip = motion.flip(landing(world, 3.85, 6.0))
+    assert flip.state.battery_V is not None
+    assert motion.start_state(world, flip).battery_V == flip.state.battery_V
+    assert motion.start_state(World("habas2021", "wide_short", "table1"), flip).battery_V is None
+
+
+@pytest.mark.parametrize("back", [20, 0])
+def test_a_sample_that_is_missing_does_not_spoil_the_others(world: World, back: int) -> None:
+    flight = landing(world, 3.85, 6.0)
+    at = int(np.argmax(flight["t_s"] >= flight.info["t_trigger_s"] - 1e-9)) - back
+    columns = {name: values.copy() for name, values in flight.samples.items()}
+    for name in ("q_w", "p_z_m"):
+        columns[name][at] = np.nan
+    broken = motion.flip(make_flight(flight.info, columns))
+    assert np.isfinite(broken.pitch_deg).all()
+    assert np.isfinite(np.asarray(broken.state.p_W_m)).all()
+
+
 def test_pitch_is_unwrapped_and_nose_up_is_positive() -> None:
     angle = np.radians(np.linspace(0.0, 400.0, 41))
     yaw = 0.7

@@ -1,11 +1,13 @@
-"""Whether every landing ends, whatever the vehicle: random valid vehicles fly random landings, and their ends are counted.
+"""Whether every landing ends, whatever the vehicle: random valid vehicles fly random landings, whose ends are counted.
 
-A vehicle is drawn around a shipped one with a shipped gear. Parameters with a `sigma` in their file are drawn over three
-times that; the others, and in every second vehicle those as well, over the spreads below, which are wider than what is known of a
-real vehicle. What the model or the flight core refuses is drawn again. A landing has a random start, approach and policy.
+A vehicle is drawn around a shipped one with a shipped gear. Parameters with a `sigma` in their file are drawn over
+three times that; the others, and in every second vehicle those as well, over the spreads below, which are wider than
+what is known of a real vehicle. What the model or the flight core refuses is drawn again. A landing has a random start,
+approach and policy.
 
-A landing depends on the seed and its number alone, so a study can be cut into parts (--first) and flown anywhere; one landing
-alone (--landings 1) is printed as the Python that flies it. Ctrl-C ends a study early; what it has found until then is printed.
+A landing depends on the seed and its number alone, so a study can be cut into parts (--first) and flown anywhere; one
+landing alone (--landings 1) is printed as the Python that flies it. Ctrl-C ends a study early; what it has found until
+then is printed.
 
 usage: ends_study.py [--landings N] [--first N] [--seed N] [--threads N]      prints a table in Markdown
 """
@@ -288,7 +290,7 @@ def _draw_states(vehicle: Vehicle, specs: Specs, rng: np.random.Generator) -> No
     ceiling_m = vehicle.overrides.get("world.ceiling_height", native.library().params["world.ceiling_height"].default)
     specs["p_start_W_m"][:, 2] = ceiling_m - rng.uniform(0.02, min(2.5, ceiling_m), n)
     specs["v_start_W_mps"] = rng.uniform(-4.0, 4.0, (n, 3))
-    tilted = rng.normal(0.0, (0.3, 0.5, 0.3, 0.0), (n, 4)) + (0.0, 0.0, 0.0, 1.0)
+    tilted = (*rng.normal(0.0, (0.3, 0.5, 0.3, 0.0), (n, 4)), 0.0, 0.0, 0.0, 1.0)
     specs["q_start_WB"] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
     specs["w_start_B_radps"] = rng.normal(0.0, 10.0, (n, 3))
     fastest = float(vehicle.native_model.derived()["rotor_speed_max_radps"][0])
@@ -382,13 +384,15 @@ def report(tally: Tally, seed: int) -> str:
     lines = [
         markdown(tally),
         "",
-        f"{tally.n_vehicles} vehicles; {tally.refused.total()} draws refused and drawn again{f' ({refused})' * bool(refused)}",
+        f"{tally.n_vehicles} vehicles; {tally.refused.total()} draws refused and drawn again"
+        f"{f' ({refused})' * bool(refused)}",
         f"{tally.wall_s:.0f} s of flying, {tally.n_landings / max(tally.wall_s, 1e-9):,.0f} landings a second",
     ]
     if tally.n_landings:
         longest, slowest = tally.longest, tally.slowest
         lines += [
-            f"most steps: {longest.value:.0f}, landing {longest.landing}, {_alone_ms(longest.landing, seed):.0f} ms alone",
+            f"most steps: {longest.value:.0f}, landing {longest.landing}, "
+            f"{_alone_ms(longest.landing, seed):.0f} ms alone",
             f"slowest vehicle: {1e3 * slowest.value:.2f} ms a landing; its longest is landing {slowest.landing}, "
             f"{_alone_ms(slowest.landing, seed):.0f} ms alone",
         ]

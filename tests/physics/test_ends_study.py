@@ -32,7 +32,7 @@ def test_the_sample_is_not_trivial(tally):
     assert tally.n_vehicles == 8
 
 
-def test_a_landing_depends_on_the_seed_and_its_number_alone(tally):
+def test_a_landing_depends_on_the_seed_and_its_number_alone():
     number = 3 * LANDINGS_PER_VEHICLE + 77
     alone = study(landings=1, seed=SEED, first=number)
     vehicle = draw_vehicle(SEED, 3)

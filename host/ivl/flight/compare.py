@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ivl.errors import ConfigError
+from ivl.errors import ConfigError, IvlError
 from ivl.flight import motion
 from ivl.flight.motion import Flip, Simulated
 from ivl.flight.store import Flights, FloatArray
@@ -27,6 +27,8 @@ _POLICY_ROLLOUTS = 1000
 _WINDOW_ROLLOUTS, _WINDOW_STEP_PER_S, _WINDOW_MARGIN_PER_S = 64, 0.05, 0.6
 GROUP_NMM, _GROUP_FLIGHTS = 0.3, 3
 _BOOTSTRAPS = 2000
+_TRIGGER_LATE_S = 0.003
+"""A flip that the simulated vehicle begins later than this, more than a tick, is another flip."""
 _BANDS = (10.0, 50.0, 90.0)
 
 
@@ -80,6 +82,10 @@ class Window:
     rate: FloatArray
     flown: tuple[tuple[float, int], ...]
 
+    def has(self, flip: Flip) -> bool:
+        """True for a flight of this approach and nearly this moment."""
+        return flip.approach == self.approach and abs(flip.moment_y_Nmm - self.moment_y_Nmm) <= GROUP_NMM
+
     def span(self) -> tuple[float, float] | None:
         """Smallest and largest threshold at which half of the simulated landings succeed; None if there is none."""
         good = self.rrev_c_per_s[self.rate >= _WINDOW_RATE]
@@ -126,10 +132,11 @@ class Comparison:
             str(c): dict(zip(map(str, CLASSES), map(float, rates[flown == c].sum(axis=0)), strict=True))
             for c in CLASSES
         }
+        both = bool(landed.any() and not landed.all())  # ranking needs flights of both kinds
         return {
             "n_judged": len(judged),
-            "landed_auc": auc(rates[:, 0], landed),
-            "landed_auc_95": interval(lambda i: auc(rates[i, 0], landed[i]), len(judged)),
+            "landed_auc": auc(rates[:, 0], landed) if both else None,
+            "landed_auc_95": interval(lambda i: auc(rates[i, 0], landed[i]), len(judged)) if both else None,
             "landed_brier": brier(rates[:, 0], landed),
             "landed_brier_95": interval(lambda i: brier(rates[i, 0], landed[i]), len(judged)),
             "rate_by_flown_legs": by_legs,
@@ -197,7 +204,14 @@ def compare(
         ConfigError: No flight can be compared, or a file is wrong.
     """
     found, left_out = flips(flights)
+    approach = _usual([flip.approach for flip in found if flip.approach is not None])
+    if policies and approach is None:
+        raise ConfigError(
+            "--policy: the flights do not say their speed and angle: import them with --speed and --angle"
+        )
     home = World(vehicle, gear, gear_set, None, **(overrides or {}))
+    found, refused = flyable(home, found)
+    left_out += refused
     rng = np.random.default_rng(seed)
     rows = []
     for number, flip in enumerate(found):
@@ -207,20 +221,40 @@ def compare(
         rows.append(Row(flip, motion.fly(quiet, flip), rates, class_of(flip.n_legs)))
         if progress:
             progress(number + 1, len(found))
-    approach = _usual_approach(found)
     windows: tuple[Window, ...] = ()
     at_policies: list[tuple[float, float, float]] = []
     if approach is not None:
-        alike = [flip for flip in found if flip.approach == approach and np.isfinite(flip.rrev_c_per_s)]
-        windows = tuple(_window(home, approach, group, moment) for moment, group in _groups(alike))
+        usual = _usual([_room(flip) for flip in found if flip.approach == approach])
+        alike = [flip for flip in found if flip.approach == approach and _room(flip) == usual]
+        site = in_room(home, alike[0]) if alike else home
+        groups = _groups([flip for flip in alike if np.isfinite(flip.rrev_c_per_s)])
+        windows = tuple(_window(site, approach, group, moment) for moment, group in groups)
         at_policies = [
-            (rrev, moment, _rate(home, approach, rrev, moment, _POLICY_ROLLOUTS)) for rrev, moment in policies
+            (rrev, moment, _rate(site, approach, rrev, moment, _POLICY_ROLLOUTS)) for rrev, moment in policies
         ]
-    elif policies:
-        raise ConfigError(
-            "--policy: the flights do not say their speed and angle: import them with --speed and --angle"
-        )
     return Comparison(tuple(rows), tuple(left_out), windows, tuple(at_policies))
+
+
+def flyable(home: World, found: Sequence[Flip]) -> tuple[list[Flip], list[str]]:
+    """Flips that the simulation can start as they were recorded, and one line for each that it cannot.
+
+    Raises:
+        ConfigError: It can start none.
+    """
+    good, refused = [], []
+    for flip in found:
+        try:
+            simulated = motion.fly(motion.quiet_world(in_room(home, flip)), flip)
+        except IvlError as error:
+            refused.append(str(error) if flip.label in str(error) else f"flight {flip.label}: {error}")
+            continue
+        if float(simulated.trace.outcome.t_trigger_s) <= _TRIGGER_LATE_S:
+            good.append(flip)
+        else:
+            refused.append(f"flight {flip.label}: it moves away from the ceiling at its trigger")
+    if not good:
+        raise ConfigError(f"no flight can be flown: {refused[0]}")
+    return good, refused
 
 
 def in_room(world: World, flip: Flip) -> World:
@@ -309,10 +343,14 @@ def _predict(
     return landed, two, none
 
 
-def _usual_approach(found: Sequence[Flip]) -> tuple[float, float] | None:
-    """The approach that most flights have; None if no flight says."""
-    known = [flip.approach for flip in found if flip.approach is not None]
-    return max(known, key=known.count) if known else None
+def _usual(values: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+    """The value that most flights have; None without any."""
+    return max(values, key=values.count) if values else None
+
+
+def _room(flip: Flip) -> tuple[float, float]:
+    """Plane of the cues and surface of the ceiling; the latter -1 if it was not measured."""
+    return flip.h_plane_m, flip.h_surface_m if np.isfinite(flip.h_surface_m) else -1.0
 
 
 def _groups(found: Sequence[Flip]) -> list[tuple[float, list[Flip]]]:

@@ -53,6 +53,9 @@ _STEP = 0.02
 """For derivatives, in units of the prior's spread: motion is smooth, the time of a contact is not."""
 _RESAMPLES = 1000
 _ALIKE, _SILENT = 0.9, 0.8
+_UNSEEN = 1e-6
+"""Information about a parameter, in units of its scale, below which the flights do not depend on it."""
+_NORMAL_95 = 1.96
 _FITTED_GROUPS = ("world", "body", "rotor", "battery", "aero", "sense", "prop_plate", "base_plate", "plate")
 
 
@@ -107,6 +110,8 @@ class Identification:
         words: What the flights cannot tell, one sentence each.
         left_out: Flights that could not be used, one line each.
         draws: Equally good fits: parameter values of resampled flights, shape (n_draws, n_parameters).
+        held: Parameters that were changed and held.
+        rotor_error: Fitted common error of the recorded rotor speeds at the trigger, as a share; `after` is without it.
     """
 
     estimates: tuple[Estimate, ...]
@@ -119,6 +124,8 @@ class Identification:
     words: tuple[str, ...]
     left_out: tuple[str, ...]
     draws: FloatArray
+    held: Mapping[str, float]
+    rotor_error: float
 
     def overrides(self) -> dict[str, float]:
         """The fitted values, as overrides of a world."""
@@ -138,6 +145,8 @@ class Identification:
             },
             "correlation": self.correlation.tolist(),
             "spread": dict(self.spread),
+            "held": dict(self.held),
+            "rotor_error": self.rotor_error,
             "before": dict(self.before),
             "after": dict(self.after),
             "words": list(self.words),
@@ -174,8 +183,12 @@ def identify(
         ConfigError: A name is unknown or cannot be fitted, a file is wrong, or no flight can be used.
     """
     held = dict(overrides or {})
+    _check_sigmas(names, sigmas or {})
     priors = _priors(vehicle, names, held, sigmas or {})
     found, left_out = compare.flips(flights)
+    _check_site(names, held, found)
+    found, refused = compare.flyable(World(vehicle, gear, gear_set, None, **held), found)
+    left_out += refused
     judged = [held_out is not None and held_out(i, flip) for i, flip in enumerate(found)]
     used = [flip for flip, out in zip(found, judged, strict=True) if not out]
     apart = [flip for flip, out in zip(found, judged, strict=True) if out]
@@ -185,19 +198,66 @@ def identify(
     rng = np.random.default_rng(seed)
     x, spread = problem.solve(rng, progress)
     at, blocks = problem.derivatives(x, spread)
+    _check_seen(names, priors, blocks)
     values, draws, covariance = problem.resample(x, at, blocks, rng)
     sigma = np.sqrt(np.diag(covariance))
     reach = float(stats.t.ppf(0.975, max(len(used) - 1, 1))) * sigma  # few flights tell their own spread badly
     estimates = tuple(
-        Estimate(name, native.library().params[name].unit, prior, float(v), float(s), (float(v - r), float(v + r)))
+        Estimate(name, native.library().params[name].unit, prior, float(v), float(s), _interval(prior, v, r))
         for name, prior, v, s, r in zip(names, priors, values, sigma, reach, strict=True)
     )
     fitted = {**held, **{e.name: e.value for e in estimates}}
     correlation = covariance / np.outer(sigma, sigma)
     before, after = ({"fitted": problem.errors(used, o), "held_out": problem.errors(apart, o)} for o in (held, fitted))
-    words = _words(estimates, correlation, len(used))
+    words = _words(estimates, correlation, len(used)) + _no_better(before, after)
     labels = tuple(flip.label for flip in used), tuple(flip.label for flip in apart)
-    return Identification(estimates, correlation, *labels, spread, before, after, words, tuple(left_out), draws)
+    return Identification(
+        estimates, correlation, *labels, spread, before, after, words, tuple(left_out), draws, held,
+        _ROTOR_SIGMA * float(x[-1]),
+    )  # fmt: skip
+
+
+def _check_sigmas(names: Sequence[str], sigmas: Mapping[str, float]) -> None:
+    for name in sigmas:
+        if name not in names:
+            raise ConfigError(f"--sigma: {name}: is not fitted (fitted: {', '.join(names)})")
+
+
+def _check_site(names: Sequence[str], held: Mapping[str, float], found: Sequence[Flip]) -> None:
+    """The flights give the ceiling of their room; what they have measured cannot be fitted or held otherwise."""
+    measured = any(np.isfinite(flip.h_surface_m) for flip in found)
+    for option, asked in (("--fit", names), ("--set", held)):
+        if "world.ceiling_height" in asked:
+            raise ConfigError(f"{option}: world.ceiling_height: the flights give it (h_plane_m)")
+        if measured and "world.sensed_gap_offset" in asked:
+            raise ConfigError(f"{option}: world.sensed_gap_offset: these flights measured it (h_surface_m)")
+
+
+def _check_seen(names: Sequence[str], priors: Sequence[Prior], blocks: Sequence[FloatArray]) -> None:
+    """A parameter without effect on the flights and without a prior has no value."""
+    seen = np.sum([np.sum(block**2, axis=0) for block in blocks], axis=0)
+    for name, prior, size in zip(names, priors, seen[:-1], strict=True):
+        if not np.isfinite(prior.sigma) and size < _UNSEEN:
+            raise ConfigError(
+                f"--fit: {name}: the motion of these flights does not depend on it, and the vehicle file gives no "
+                "sigma: leave it out, or state what is known with --sigma"
+            )
+
+
+def _interval(prior: Prior, value: float, reach: float) -> tuple[float, float]:
+    """95 % interval: within the allowed range, and not wider than what was known before the flights."""
+    half = min(reach, _NORMAL_95 * prior.sigma)
+    return float(max(value - half, prior.lo)), float(min(value + half, prior.hi))
+
+
+def _no_better(before: Mapping[str, Any], after: Mapping[str, Any]) -> tuple[str, ...]:
+    was, now = (figures["fitted"]["pitch_rms_deg"] for figures in (before, after))
+    if now <= was:
+        return ()
+    return (
+        f"Pitch is {now:.1f} degrees off after the fit and {was:.1f} before: the fit weighs height, rate and contacts "
+        "as well, and lets the rotor speeds at the trigger be off together. The old vehicle explains pitch better.",
+    )
 
 
 class _Problem:
@@ -237,8 +297,8 @@ class _Problem:
 
     def solve(self, rng: np.random.Generator, progress: Callable[[str], None] | None) -> tuple[FloatArray, Spread]:
         """Alternate between the fit and the spread of its residuals."""
-        spread = dict(_START_SPREAD)
-        x = self._best_start(rng, spread)
+        x = self._best_start(rng, dict(_START_SPREAD))
+        spread = _spread(self.raw(x))
         for number in range(_ROUNDS):
             before, x = x, self._fit(x, spread)
             spread = _spread(self.raw(x))
@@ -456,7 +516,7 @@ def _words(estimates: Sequence[Estimate], correlation: FloatArray, n: int) -> tu
         if at_bound < 1e-6 * max(abs(one.value), 1e-9):
             words.append(f"{one.name} ended at the end of its allowed range: the model does not explain the flights.")
     if n < 5:
-        words.append(f"{n} flights are few: the intervals are rough.")
+        words.append(f"Few flights ({n}): the intervals are rough.")
     return tuple(words)
 
 
@@ -472,6 +532,10 @@ def vehicle_file(vehicle: str, result: Identification, source: str) -> dict[str,
     fitted = {estimate.name: estimate for estimate in result.estimates}
     groups: dict[str, dict[str, Any]] = {}
     quantities = {name: replace_quantity(q, fitted.get(name), source) for name, q in part.quantities.items()}
+    for name, value in result.held.items():
+        if name.partition(".")[0] != "leg":  # the legs are of the gear's file
+            unit = native.library().params[name].unit
+            quantities[name] = {"value": value, "unit": unit, "source": "held by hand while the others were identified"}
     for name, estimate in fitted.items():
         if name not in quantities:
             quantities[name] = _quantity(estimate, source)

@@ -107,8 +107,8 @@ def flip(flight: Flight) -> Flip:
     """
     _check(flight)
     t_s = flight["t_s"] - (float(flight.info["t_trigger_s"]) - _trigger_age(flight))
-    at = int(np.argmax(t_s >= -1e-9))
     fresh = _fresh(flight)
+    at = int(np.argmax((t_s >= -1e-9) & _complete(flight)))
     before = fresh & (t_s > -_BEFORE_S) & (t_s <= t_s[at])
     after = fresh & (t_s > 0)
     if before.sum() < 3 or after.sum() < 5:
@@ -176,7 +176,8 @@ def start_state(world: World, flip: Flip, rotor_factor: float = 1.0) -> State:
     most = world.derived()["rotor_speed_max_radps"]
     speed = float(np.sqrt(max(force_N, 0.0) / (4.0 * values["rotor.thrust_constant"] * air)))
     rotors = np.full(4, min(rotor_factor * speed, most))
-    return replace(flip.state, p_W_m=p_W_m, v_W_mps=v_W_mps, rotor_radps=rotors)
+    battery_V = flip.state.battery_V if values["battery.voltage"] > 0.0 else None  # a voltage would turn the battery on
+    return replace(flip.state, p_W_m=p_W_m, v_W_mps=v_W_mps, rotor_radps=rotors, battery_V=battery_V)
 
 
 def _present_climb(world: World, flip: Flip) -> float:
@@ -207,6 +208,8 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
     trace = world.trace(*FLIP_AT_ONCE, flip.moment_y_Nmm, seed=seed, start="state", state=start,
                         period_s=_TRACE_PERIOD_S)  # fmt: skip
     rows = trace.rows
+    if len(rows) < 2:
+        raise ConfigError(f"flight {flip.label}: it starts at or behind the ceiling: check h_plane_m and h_surface_m")
     values = world.params.values
     # a sample shows a pose that came within the period before it
     lag_s = values["sense.latency"] + 0.5 * float(np.median(np.diff(flip.t_s)))
@@ -243,11 +246,14 @@ def pitch_deg(q_WB: FloatArray) -> FloatArray:
     """Nose-up rotation of attitudes, unwrapped over time, degrees.
 
     Args:
-        q_WB: Unit quaternions x, y, z, w, shape (n, 4).
+        q_WB: Unit quaternions x, y, z, w, shape (n, 4); a sample that is not known gives NaN there and nowhere else.
     """
     x, y, z, w = q_WB.T
     nose_z, up_z = 2.0 * (x * z - w * y), 1.0 - 2.0 * (x * x + y * y)
-    return np.asarray(np.degrees(np.unwrap(np.arctan2(nose_z, up_z))))
+    turned = np.degrees(np.arctan2(nose_z, up_z))
+    known = np.isfinite(turned)
+    turned[known] = np.unwrap(turned[known], period=360.0)
+    return np.asarray(turned)
 
 
 def _climb(flight: Flight, t_s: FloatArray, before: BoolArray) -> tuple[float, float, bool]:
@@ -257,10 +263,12 @@ def _climb(flight: Flight, t_s: FloatArray, before: BoolArray) -> tuple[float, f
     """
     last = before & (t_s > -_THRUST_S)
     force = flight.stack("f", "xyz", "mps2")[last]
-    if len(force) and np.isfinite(force).all():
-        x, y, z, w = flight.stack("q", "xyzw")[last].T
+    known = np.isfinite(force).all(axis=1)
+    if known.any():
+        force, rows = force[known], np.flatnonzero(last)[known]
+        x, y, z, w = flight.stack("q", "xyzw")[rows].T
         up = np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
-        return float(np.mean(np.sum(up * force, axis=1))) - GRAVITY_MPS2, -float(np.mean(t_s[last])), False
+        return float(np.mean(np.sum(up * force, axis=1))) - GRAVITY_MPS2, -float(np.mean(t_s[rows])), False
     return float(np.polyfit(t_s[before], flight["v_z_mps"][before], 1)[0]), -float(np.mean(t_s[before])), True
 
 
@@ -312,7 +320,11 @@ def _fresh(flight: Flight) -> BoolArray:
     """Samples that differ from the one before: a log repeats its last value while nothing new has come."""
     pose = np.stack([flight[name] for name in POSE], axis=1)
     changed = (np.diff(pose, axis=0) != 0.0).any(axis=1)
-    return np.concatenate(([True], changed)) & np.isfinite(pose).all(axis=1)
+    return np.concatenate(([True], changed)) & _complete(flight)
+
+
+def _complete(flight: Flight) -> BoolArray:
+    return np.asarray(np.isfinite(np.stack([flight[name] for name in POSE], axis=1)).all(axis=1))
 
 
 def _new_pose(flight: Flight) -> BoolArray:

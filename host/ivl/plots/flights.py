@@ -56,8 +56,8 @@ def _largest_group(comparison: Comparison) -> list[int]:
     """Rows of the moment that most flights have; all where no group is large."""
     if not comparison.windows:
         return list(range(len(comparison.rows)))
-    moment = comparison.windows[0].moment_y_Nmm
-    return [i for i, row in enumerate(comparison.rows) if abs(row.flip.moment_y_Nmm - moment) <= compare.GROUP_NMM]
+    window = comparison.windows[0]
+    return [i for i, row in enumerate(comparison.rows) if window.has(row.flip)]
 
 
 def _draw_signal(axis: Axes, rows: Sequence[Row], name: str, bands: Sequence[tuple[FloatArray, FloatArray]]) -> None:
@@ -69,7 +69,7 @@ def _draw_signal(axis: Axes, rows: Sequence[Row], name: str, bands: Sequence[tup
     axis.fill_between(times, low, high, color=style.BLUE, alpha=0.3, linewidth=0)
     axis.plot(times, middle, color=style.BLUE, linewidth=1.5)
     for row in rows:
-        colour = _COLOURS.get(row.n_legs_flown if row.n_legs_flown is not None else 0, style.GREY)
+        colour = style.GREY if row.n_legs_flown is None else _COLOURS[row.n_legs_flown]
         values = getattr(row.flip, name)
         shown = motion.clip_rate(values) if name == "rate_radps" else values
         axis.plot(row.flip.t_s, shown, color=colour, linewidth=0.6, alpha=0.8)
@@ -94,5 +94,8 @@ def _draw_windows(axis: Axes, windows: Sequence[Window], policies: Sequence[tupl
     axis.set_ylim(-0.13, 1.1)
     axis.set_xlabel("RREV$_c$ (1/s)")
     axis.set_ylabel("landing rate from hover")
-    axis.legend(fontsize=6, frameon=False)
+    if windows or policies:
+        axis.legend(fontsize=6, frameon=False)
+    else:
+        axis.text(0.5, 0.5, "no window: fewer than three flights alike", transform=axis.transAxes, ha="center")
     style.finish(axis)

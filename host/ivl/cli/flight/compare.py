@@ -49,6 +49,8 @@ def compare(
     path = plot or (None if as_json else Path("comparison.png"))
     if path is not None and path.suffix not in _SUFFIXES:
         raise ConfigError(f"--plot {path}: unknown kind of file (allowed {', '.join(_SUFFIXES)})")
+    if path is not None:
+        options.check_parent("--plot", path)
     flights = store.read(folder)
     changes = options.overrides(settings)
     with Progress(console=console.err, transient=True) as progress:
@@ -57,14 +59,15 @@ def compare(
             flights, vehicle, gear, gear_set, changes, rollouts, seed, options.policies(policy),
             progress=lambda done, total: progress.update(task, completed=done, total=total),
         )  # fmt: skip
-        if path is not None:
-            _draw(library, result, (vehicle, gear, gear_set), changes, path)
     summary = result.summary()
     if as_json:
         console.print_json(summary)
-        return
-    _report(summary, f"{vehicle}, {gear_set}/{gear}")
-    console.say(f"figure: {path}")
+    else:
+        _report(summary, f"{vehicle}, {gear_set}/{gear}")
+    if path is not None:
+        _draw(library, result, (vehicle, gear, gear_set), changes, path)
+        if not as_json:
+            console.say(f"figure: {path}")
 
 
 def _draw(library: Any, result: Any, made: tuple[str, str, str], changes: dict[str, float], path: Path) -> None:
@@ -103,8 +106,11 @@ def _report(summary: dict[str, Any], name: str) -> None:
 
 
 def _report_outcomes(summary: dict[str, Any], line: Any) -> None:
-    low, high = summary["landed_auc_95"]
-    line("landed or not: AUC", f"{summary['landed_auc']:.2f} (95 %: {low:.2f} to {high:.2f})")
+    if summary["landed_auc"] is None:
+        line("landed or not: AUC", "unknown: it needs flights that landed and flights that did not")
+    else:
+        low, high = summary["landed_auc_95"]
+        line("landed or not: AUC", f"{summary['landed_auc']:.2f} (95 %: {low:.2f} to {high:.2f})")
     low, high = summary["landed_brier_95"]
     line("landed or not: Brier score", f"{summary['landed_brier']:.3f} (95 %: {low:.3f} to {high:.3f})")
     rates = summary["rate_by_flown_legs"]

@@ -59,6 +59,7 @@ def identify(
         raise ConfigError(f"--out {out}: a vehicle file ends in .yaml")
     if hold_out == 1:
         raise ConfigError("--hold-out 1: would hold out every flight (allowed 0, or 2 and more)")
+    options.check_parent("--out", out)
     low, high = _range(hold_out_moment)
     flights = store.read(folder)
     sigmas = {text.partition("=")[0]: _number(text) for text in sigma or []}
@@ -84,6 +85,8 @@ def _range(text: str) -> tuple[float, float]:
         low, high = (float(word) for word in text.split(":"))
     except ValueError as error:
         raise ConfigError(f"--hold-out-moment {text}: expected LO:HI in N mm, for example 6.5:9") from error
+    if not low <= high:
+        raise ConfigError(f"--hold-out-moment {text}: LO must not be above HI")
     return low, high
 
 
@@ -127,5 +130,10 @@ def _report(summary: dict[str, Any]) -> None:
         if before is not None:
             text = f"pitch {before['pitch_rms_deg']:.1f} deg before, {after['pitch_rms_deg']:.1f} deg after"
             console.out.print(f"{label} flights: {text}", highlight=False)
+    error = 100.0 * summary["rotor_error"]
+    text = f"rotor speeds at the trigger, fitted along: {error:+.2f} % (not part of the vehicle)"
+    console.out.print(text, highlight=False)
+    for text in summary["left_out"]:
+        console.out.print(f"left out: {text}", highlight=False, markup=False, soft_wrap=True)
     for word in summary["words"]:
         console.out.print(word, highlight=False, soft_wrap=True)

@@ -52,3 +52,13 @@ def policies(texts: list[str] | None) -> list[tuple[float, float]]:
             raise ConfigError(f"--policy {text}: expected RREV_C,M_YD in 1/s and N mm, for example 4.0,8.12") from error
         result.append((rrev, moment))
     return result
+
+
+def check_parent(option: str, path: Path) -> None:
+    """Refuse a file in a folder that does not exist before any work is done.
+
+    Raises:
+        ConfigError: The folder is missing.
+    """
+    if not path.parent.is_dir():
+        raise ConfigError(f"{option} {path}: the folder {path.parent} does not exist")
