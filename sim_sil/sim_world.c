@@ -11,7 +11,7 @@ static const double NEAR_MARGIN_M = 0.05;  // more than a vehicle moves in one s
 static const double FAR_M = 1.0;           // stands for the gap of what cannot make an event
 static const double NO_EVENT = 2.0;        // share of a step, beyond its end
 static const double TIME_SLACK_S = 1.0e-9;
-static const double LEAST_V = 0.01;        // a drawn voltage stays above that of a supply that never sags
+static const double LEAST_V = 0.01;      // a drawn voltage stays above that of a supply that never sags
 static const double STILL_RADPS = 20.0;  // a body that turns slower than this is not looked at closely
 
 static double smaller(double a, double b)

@@ -177,7 +177,10 @@ def test_any_rollout_in_range_ends_with_a_sane_outcome(
     assert (out.leg_order > 0).sum() >= out.n_legs
     assert np.isfinite(out.d_min_m)
     assert np.isfinite(out.t_end_s)
-    assert world.end_reason(out.end_reason) not in ("?", "not_finite", "refused")
+    end = world.end_reason(out.end_reason)
+    assert end not in ("?", "not_finite", "step_limit")
+    # a slow approach from a hover would begin behind the surface, which hangs below the plane of the cues
+    assert end != "refused" or (start == "flown" and speed * np.sin(np.radians(angle)) < 0.2)
 
 
 @pytest.mark.parametrize("start", ["imparted", "flown"])
