@@ -290,7 +290,7 @@ def _draw_states(vehicle: Vehicle, specs: Specs, rng: np.random.Generator) -> No
     ceiling_m = vehicle.overrides.get("world.ceiling_height", native.library().params["world.ceiling_height"].default)
     specs["p_start_W_m"][:, 2] = ceiling_m - rng.uniform(0.02, min(2.5, ceiling_m), n)
     specs["v_start_W_mps"] = rng.uniform(-4.0, 4.0, (n, 3))
-    tilted = (*rng.normal(0.0, (0.3, 0.5, 0.3, 0.0), (n, 4)), 0.0, 0.0, 0.0, 1.0)
+    tilted = rng.normal(np.array([0.0, 0.0, 0.0, 1.0]), (0.3, 0.5, 0.3, 0.0), (n, 4))
     specs["q_start_WB"] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
     specs["w_start_B_radps"] = rng.normal(0.0, 10.0, (n, 3))
     fastest = float(vehicle.native_model.derived()["rotor_speed_max_radps"][0])
