@@ -29,13 +29,18 @@ VARIANTS = (
         dict.fromkeys(("aero.drag_xy", "aero.drag_z", "aero.ceiling_gain"), 0.0),
     ),
     ("with rotors that spin up in 10 ms", "crazyflie21", {"rotor.tau_up": 0.01}),
-    ("with rotors that stop in 0.1 ms", "crazyflie21", {"rotor.tau_down": 0.0001}),
+    ("with rotors that stop in 0.1 ms", "crazyflie21", {"rotor.tau_down": 0.0001, "rotor.drag_share": 0.0}),
+    ("with a battery that never sags", "crazyflie21", {"battery.voltage": 0.0}),
     (
         "with the inertia of `habas2021`",
         "crazyflie21",
         {"body.inertia_xx": 4.935e-5, "body.inertia_yy": 4.935e-5, "body.inertia_zz": 2.926e-5},
     ),
-    ("`habas2021` with rotors that stop in 150 ms", "habas2021", {"rotor.tau_down": 0.15}),
+    (
+        "`habas2021` with rotors that slow as these",
+        "habas2021",
+        {"rotor.tau_down": 0.194, "rotor.drag_share": 0.9},
+    ),
 )
 
 
