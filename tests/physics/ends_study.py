@@ -35,7 +35,7 @@ ATTEMPTS_MAX = 100
 PROGRESS_S = 10.0
 DEFECTS_TOLD = 20
 DEFECTS = ("not_finite", "step_limit")
-"""Ends that say nothing about a policy: the first must never be, the second stands for motion that nobody can resolve."""
+"""Ends that say nothing about a policy: the first must never be, the second is of motion that cannot be resolved."""
 
 FACTORS = {
     "body.mass": 1.2,
