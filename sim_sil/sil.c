@@ -250,9 +250,9 @@ long ivl_sil_trace(const void *model, const void *spec, double period_s, void *r
     return (long)tracer.n;
 }
 
-int ivl_sil_replay(const void *model, const void *config, float rrev_c_per_s, float moment_y_Nm, const void *inputs, size_t n, void *rows)
+int ivl_sil_replay(const void *model, const void *config, int form, const double *theta, const void *inputs, size_t n, void *rows)
 {
-    const ivl_policy_t policy = {.seq = 1, .rrev_c_per_s = rrev_c_per_s, .moment_y_Nm = moment_y_Nm};
+    const ivl_policy_t policy = ivl_sim_policy(form, theta, false);
     return (int)ivl_sim_replay(model, config, &policy, inputs, n, rows);
 }
 
@@ -278,6 +278,50 @@ int ivl_sil_hover(const void *model, const double *setpoints, size_t n_setpoints
     free(setpoint);
     free(flight);
     return good ? 0 : -1;
+}
+
+uint32_t ivl_sil_form(int number, const char **name, const char **doc)
+{
+    const ivl_form_t *form = ivl_form((uint32_t)number);
+    if (form == NULL)
+    {
+        return 0;
+    }
+    *name = form->name;
+    *doc = form->doc;
+    return form->n_params;
+}
+
+int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field)
+{
+    const ivl_form_t *form = ivl_form((uint32_t)number);
+    if (form == NULL || i >= form->n_params)
+    {
+        return -1;
+    }
+    const ivl_form_param_t *row = &form->params[i];
+    *field = (ivl_sil_field_t){.name = row->name,
+                               .type = "f4",
+                               .offset = (uint32_t)(i * sizeof(float)),
+                               .count = 1,
+                               .unit = row->unit,
+                               .lo = (double)row->lo,
+                               .hi = (double)row->hi,
+                               .dflt = (double)row->per_unit,
+                               .doc = row->doc};
+    return 0;
+}
+
+int ivl_sil_policy_accepted(const void *model, int form, const double *theta)
+{
+    const ivl_sim_model_t *m = model;
+    const ivl_policy_t     policy = ivl_sim_policy(form, theta, false);
+    return (ivl_policy_check(&m->firmware, &policy) == IVL_OK) ? 1 : 0;
+}
+
+uint32_t ivl_sil_policy_crc(int form, const double *theta)
+{
+    return ivl_sim_policy(form, theta, false).id.crc;
 }
 
 const char *ivl_sil_end_reason(int code)

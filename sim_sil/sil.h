@@ -36,7 +36,7 @@ typedef enum
 
 enum
 {
-    IVL_SIL_ABI_VERSION = 1
+    IVL_SIL_ABI_VERSION = 2
 };
 
 int ivl_sil_abi_version(void);
@@ -58,10 +58,10 @@ int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threa
 /// @return rows that the landing has; -1 if the period is not positive
 long ivl_sil_trace(const void *model, const void *spec, double period_s, void *rows, size_t capacity, void *outcome);
 
-/// A flight core of this configuration (layout IVL_SIL_LAYOUT_CONFIG) and policy steps through n recorded inputs, where the model's core runs.
+/// A flight core of this configuration (layout IVL_SIL_LAYOUT_CONFIG) and policy (form, and 64 parameters in SI) steps through n recorded inputs, where the model's core runs.
 /// @param[out] rows  n rows of IVL_SIL_TABLE_REPLAY_OUT
 /// @return 0; 1 if the core refuses the configuration, 2 if it refuses the policy
-int ivl_sil_replay(const void *model, const void *config, float rrev_c_per_s, float moment_y_Nm, const void *inputs, size_t n, void *rows);
+int ivl_sil_replay(const void *model, const void *config, int form, const double *theta, const void *inputs, size_t n, void *rows);
 
 /// Flies n hovers, each through n_setpoints set-points of four numbers: time from which it holds (s), position (m).  A flight starts at its
 /// first set-point and has n_rows rows of IVL_SIL_TABLE_TRACE, one each period.
@@ -69,6 +69,20 @@ int ivl_sil_replay(const void *model, const void *config, float rrev_c_per_s, fl
 /// @return 0; -1 if the period is not positive, or there are no rows or no set-points
 int ivl_sil_hover(const void *model, const double *setpoints, size_t n_setpoints, const uint64_t *seeds, size_t n, double period_s,
                   void *rows, size_t n_rows);
+
+/// A form of policies (ivl_form.h).
+/// @return number of its parameters; 0 if there is no form with that number
+uint32_t ivl_sil_form(int number, const char **name, const char **doc);
+
+/// A parameter of a form: offset in its array of floats, range in SI; `dflt` is what one `unit` is in SI.
+/// @return 0; -1 if there is none
+int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field);
+
+/// 1 if a flight core with this model's configuration puts the policy in force, else 0.
+int ivl_sil_policy_accepted(const void *model, int form, const double *theta);
+
+/// CRC-32 of a policy, as the vehicle computes it; 0 if there is no such form.
+uint32_t ivl_sil_policy_crc(int form, const double *theta);
 
 const char *ivl_sil_end_reason(int code);
 const char *ivl_sil_phase_name(int code);

@@ -52,7 +52,7 @@
     X(float, thrust3_N, "f4", "N", o->thrust_N[2], "thrust command, rear left") \
     X(float, thrust4_N, "f4", "N", o->thrust_N[3], "thrust command, front left") \
     X(float, thrust_total_N, "f4", "N", o->thrust_total_N, "their sum") \
-    X(float, moment_y_Nm, "f4", "N m", o->moment_y_Nm, "moment about b_y of the thrust commands; nose-up is negative") \
+    X(float, pitch_moment_Nm, "f4", "N m", o->pitch_moment_Nm, "moment about b_y of the thrust commands; nose-up is negative") \
     X(float, trigger_rrev_per_s, "f4", "1/s", s->snapshot.rrev_per_s, "RREV latched at the trigger, 0 before") \
     X(float, trigger_d_ceil_m, "f4", "m", s->snapshot.d_ceil_m, "distance latched at the trigger, 0 before") \
     X(uint32_t, n_bad_pose, "u4", "1", s->diag.n_bad_pose, "ticks so far whose sensed state was refused") \

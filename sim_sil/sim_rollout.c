@@ -68,6 +68,18 @@ static bool stated_start(const ivl_sim_spec_t *spec, ivl_sim_start_state_t *star
     return true;
 }
 
+ivl_policy_t ivl_sim_policy(int32_t form, const double theta[IVL_SIM_THETAS], bool at_once)
+{
+    const ivl_form_t *f = ivl_form((uint32_t)form);
+    ivl_policy_t      policy = {.id = {.seq = 1, .form = (uint8_t)form}, .n = (f != NULL) ? f->n_params : 0u, .at_once = at_once};
+    for (uint32_t i = 0; i < policy.n; i++)
+    {
+        policy.theta[i] = (float)theta[i];
+    }
+    policy.id.crc = ivl_policy_crc(&policy);
+    return policy;
+}
+
 static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], ivl_command_t *cmd)
 {
     cmd->request = IVL_REQUEST_APPROACH;
@@ -121,9 +133,7 @@ bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_
         return false;
     }
     request_approach(spec, start.p_W_m, &world->in.cmd);
-    const bool         at_once = spec->start[0] == IVL_SIM_START_AT_TRIGGER;
-    const ivl_policy_t policy = {
-        .seq = 1, .rrev_c_per_s = at_once ? 0.0f : (float)spec->rrev_c_per_s[0], .moment_y_Nm = (float)(spec->moment_y_Nmm[0] * 1.0e-3)};
+    const ivl_policy_t policy = ivl_sim_policy(spec->form[0], spec->theta, spec->start[0] == IVL_SIM_START_AT_TRIGGER);
     return model->core.commit(group->port, lane, &model->firmware, &world->firmware, &policy) == IVL_OK;
 }
 

@@ -26,18 +26,19 @@ typedef enum
     IVL_SIM_END_COUNT
 } ivl_sim_end_t;
 
+#define IVL_SIM_THETAS 64
+
 /// X(c_type, name, count, numpy_type, unit, lo, hi, default, doc)
 // clang-format off
 #define IVL_SIM_SPEC_FIELDS(X) \
     X(double, speed_mps, 1, "f8", "m/s", 0.1, 6.0, IVL_SIM_REQUIRED, "approach speed V") \
     X(double, angle_deg, 1, "f8", "deg", 0.0, 90.0, IVL_SIM_REQUIRED, "approach angle phi above the horizontal") \
-    X(double, rrev_c_per_s, 1, "f8", "1/s", 0.0, 20.0, IVL_SIM_REQUIRED, "policy: RREV at which the flip starts") \
-    X(double, moment_y_Nmm, 1, "f8", "N mm", 0.0, 20.0, IVL_SIM_REQUIRED, "policy: nose-up moment of the front motors") \
+    X(double, theta, IVL_SIM_THETAS, "f8", "SI", -IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, 0, "policy: parameters of its form, SI; their ranges are those of the form") \
     X(double, d_ceil_m, 1, "f8", "m", 0.02, 10.0, 0.5, "start at_trigger: distance of the body origin from the plane of the cues") \
     X(uint64_t, seed, 1, "u8", "1", 0, 18446744073709551615.0, 0, "of the batch") \
     X(uint64_t, stream, 1, "u8", "1", 0, 18446744073709551615.0, 0, "number of the rollout within the seed") \
     X(int32_t, start, 1, "i4", "1", 0, IVL_SIM_START_COUNT - 1, 0, "0 imparted, 1 flown, 2 at_trigger, 3 state") \
-    X(int32_t, reserved, 1, "i4", "1", 0, 0, 0, "0") \
+    X(int32_t, form, 1, "i4", "1", 0, 255, 0, "policy: its form, row of IVL_FORMS") \
     X(double, p_start_W_m, 3, "f8", "m", -100, 100, 0, "start state: body origin in the world, below the ceiling") \
     X(double, v_start_W_mps, 3, "f8", "m/s", -20, 20, 0, "start state: velocity in the world") \
     X(double, q_start_WB, 4, "f8", "1", -1, 1, 0, "start state: attitude, x y z w, of unit length") \
@@ -133,6 +134,9 @@ typedef bool (*ivl_sim_source_t)(void *context, ivl_sim_job_t *job);
 void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
 
 // The parts of ivl_sim_fly, for a world that goes on before and after its landings.
+
+/// The policy of a specification: number 1, parameters rounded once, as a host rounds them for the radio.
+ivl_policy_t ivl_sim_policy(int32_t form, const double theta[IVL_SIM_THETAS], bool at_once);
 
 /// True if every field is within its range.
 bool ivl_sim_spec_good(const ivl_sim_spec_t *spec);

@@ -14,7 +14,7 @@ HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h firmware/
 HOST       := build/app
 HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=all \
               -Wall -Wextra -Wdouble-promotion -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes -Werror \
-              -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
+              -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -Itests/c -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
 HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) tests/app/sdk_double.c tests/app/test_app.c tests/c/default_fixture.c)
 
 # ---- Cortex-M4F: the SDK's flags, and the one of our Kbuild files

@@ -71,8 +71,13 @@ FLAGS_sim_sil/cf   += -fsanitize-coverage=inline-8bit-counters,pc-table
 FLAGS_firmware/app += -fsanitize-coverage=inline-8bit-counters,pc-table
 endif
 
-BUILD   := build/$(FLAVOUR)
-CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
+# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h
+ifneq ($(FORMS),)
+CFLAGS += -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+endif
+
+BUILD   := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
+CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
 SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/pil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
 CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out %/app_controller.c %/app_cpx.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
@@ -88,10 +93,12 @@ FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
 
 core: $(CORE)
 
-# only the release flavour is installed where Python looks for it
-lib: $(if $(filter release,$(FLAVOUR)),$(LIBRARY),$(BUILD)/libivl_sil.so)
+# only the release flavour, without forms from elsewhere, is installed where Python looks for it
+INSTALLED := $(and $(filter release,$(FLAVOUR)),$(if $(FORMS),,yes))
 
-sil: $(if $(filter release,$(FLAVOUR)),$(SERVER),$(BUILD)/ivl_sil)
+lib: $(if $(INSTALLED),$(LIBRARY),$(BUILD)/libivl_sil.so)
+
+sil: $(if $(INSTALLED),$(SERVER),$(BUILD)/ivl_sil)
 
 check: $(TESTS:%=run-%)
 	@test -n '$(TESTS)' || { echo 'error: no tests/c/test_*.c found' >&2; exit 1; }

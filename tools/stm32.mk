@@ -45,10 +45,15 @@ FLAGS_test_ivl_math := -DSWEEP_STRIDE=97
 # the start-up code fills and clears memory: its loops must not become calls to themselves
 FLAGS_startup := -fno-builtin
 
-BUILD    := build/$(FLAVOUR)
+# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h
+ifneq ($(FORMS),)
+CFLAGS += -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+endif
+
+BUILD    := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
 TARGET   := firmware/stm32f405
 PROGRAMS := tick_server replay faults
-CORE     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c))
+CORE     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
 COMMON   := $(BUILD)/$(TARGET)/startup.o $(BUILD)/$(TARGET)/semihost.o
 TESTS    := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_ivl_*.c))
 INSTALLED := host/ivl/_native/stm32f405.elf

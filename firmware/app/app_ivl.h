@@ -12,6 +12,7 @@
 #include "ivl.h"
 #include "ivl_attitude.h"
 #include "ivl_handover.h"
+#include "ivl_parts.h"
 #include "ivl_record.h"
 #include "ivl_wire.h"
 
@@ -119,6 +120,7 @@ typedef struct
     _Atomic uint32_t    n_reading;                   ///< readings of a camera that were passed on; written by the senders' tasks
     _Atomic uint32_t    n_reading_bad;               ///< and that were refused
     app_pending_t       pending;                     ///< of the app's task
+    ivl_parts_t         parts;                       ///< of the app's task: the policy that is arriving
     int                 n_config_polls;              ///< of the app's task: how often a commit was found waiting
 } app_t;
 

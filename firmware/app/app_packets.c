@@ -35,14 +35,37 @@ static uint32_t waited_ms(const app_t *app)
 
 // ---- policy
 
-static void handle_policy(app_t *app, const ivl_wire_policy_t *packet)
+static void echo_policy(const ivl_wire_policy_echo_t *echo)
 {
-    const ivl_policy_t policy = {packet->seq, packet->rrev_c_per_s, packet->moment_y_Nm};
-    (void)app_put(&app->policy_in, policy);
-    begin_wait(app, APP_WAITS_FOR_POLICY, packet->seq);
+    uint8_t bytes[IVL_WIRE_SIZE_MAX];
+    reply(bytes, ivl_wire_put_policy_echo(bytes, echo));
 }
 
-// what is in force is asked of the stabilizer's task, so that the three values belong together
+// a part that leaves others missing is answered only if it is the last in order: then its sender waits
+static void handle_policy(app_t *app, const ivl_wire_policy_t *packet)
+{
+    const ivl_wire_status_t status = ivl_parts_take(&app->parts, packet);
+    if (status == IVL_WIRE_OK)
+    {
+        (void)app_put(&app->policy_in, app->parts.policy);
+        begin_wait(app, APP_WAITS_FOR_POLICY, packet->seq);
+    }
+    else if ((status != IVL_WIRE_ERR_INCOMPLETE) || ivl_parts_is_last(packet))
+    {
+        const ivl_policy_id_t        now = app->state.policy.id;
+        const ivl_wire_policy_echo_t echo = {
+            .seq = packet->seq,
+            .status = (int8_t)status,
+            .missing = (status == IVL_WIRE_ERR_INCOMPLETE) ? app->parts.missing : (uint16_t)0,
+            .seq_in_force = now.seq,
+            .crc_in_force = now.crc,
+            .form_in_force = now.form,
+        };
+        echo_policy(&echo);
+    }
+}
+
+// what is in force is asked of the stabilizer's task, so that the values belong together
 static void poll_policy(app_t *app)
 {
     ivl_wire_policy_echo_t echo = {.seq = app->pending.seq, .status = IVL_WIRE_ERR_NO_CONTROLLER};
@@ -56,8 +79,7 @@ static void poll_policy(app_t *app)
         atomic_store(&app->policy_in.full, false);
     }
     app->pending.what = APP_WAITS_FOR_NOTHING;
-    uint8_t bytes[IVL_WIRE_SIZE_MAX];
-    reply(bytes, ivl_wire_put_policy_echo(bytes, &echo));
+    echo_policy(&echo);
 }
 
 // ---- command

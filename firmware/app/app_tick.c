@@ -34,8 +34,8 @@ void app_take_requests(app_t *app, uint64_t now_us)
     if (!atomic_load(&app->policy_out.full) && app_take(&app->policy_in, &policy))
     {
         const ivl_status_t           status = ivl_policy_commit(&app->cfg, &app->state, &policy);
-        const ivl_policy_t           now = app->state.policy;
-        const ivl_wire_policy_echo_t echo = {policy.seq, (int8_t)status, now.seq, now.rrev_c_per_s, now.moment_y_Nm};
+        const ivl_policy_id_t        now = app->state.policy.id;
+        const ivl_wire_policy_echo_t echo = {policy.id.seq, (int8_t)status, 0u, now.seq, now.crc, now.form};
         (void)app_put(&app->policy_out, echo);
     }
     if (app_take(&app->command_in, &app->in.cmd))

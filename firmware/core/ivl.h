@@ -26,7 +26,7 @@ typedef struct
     bool          stock_allowed;  ///< IDLE and not locked out: another controller may have the motors
     ivl_ceiling_t ceiling;        ///< invalid in phases that are latched off
     ivl_cues_t    cues;           ///< invalid in phases that are latched off
-    float         moment_y_Nm;    ///< moment about b_y that thrust_N makes; negative is nose up
+    float         pitch_moment_Nm;  ///< moment about b_y that thrust_N makes; negative is nose up
     float         thrust_total_N;
 } ivl_out_t;
 
@@ -38,6 +38,10 @@ void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state);
 /// landing, stay.
 /// @return IVL_OK; or, with nothing changed, IVL_ERR_RANGE or IVL_ERR_PHASE
 ivl_status_t ivl_reconfigure(ivl_cfg_t *cfg, ivl_state_t *state, const ivl_cfg_t *wanted);
+
+/// Put a policy in force as a whole, or refuse it as a whole (counted in diag.n_policy_refused).
+/// @return IVL_OK; what ivl_policy_check says; IVL_ERR_PHASE after the trigger, until the phase is IDLE again
+ivl_status_t ivl_policy_commit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy);
 
 /// One tick: sensed state -> distance -> cues -> phase (with the trigger) -> maneuver or controller -> mixer -> PWM.
 void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out);

@@ -1,6 +1,6 @@
 /// @file ivl_mixer.h
 /// Stage 6: wrench to four motor thrusts and back.
-/// Motors in B: M1 front-right (+x, -y), M2 rear-right (-x, -y), M3 rear-left (-x, +y), M4 front-left (+x, +y); +moment_y is nose down.
+/// Motors in B: M1 front-right (+x, -y), M2 rear-right (-x, -y), M3 rear-left (-x, +y), M4 front-left (+x, +y); a positive moment about b_y is nose down.
 #ifndef IVL_MIXER_H
 #define IVL_MIXER_H
 #include "ivl_controller.h"

@@ -89,8 +89,8 @@ CONDITION(must_cut)
 
 CONDITION(triggered)
 {
-    UNUSED(cfg);
-    return !rule_says(state, IVL_ACT_HOLD) && ivl_trigger_due(&state->policy, seen->cues);
+    UNUSED(cfg), UNUSED(seen);
+    return !rule_says(state, IVL_ACT_HOLD) && state->action.flip;
 }
 
 CONDITION(inverted)
@@ -169,6 +169,7 @@ static void enter_ready(ivl_state_t *state)
     state->triggered = false;
     state->guard.cause = IVL_RULE_NONE;
     memset(&state->snapshot, 0, sizeof state->snapshot);
+    memset(&state->action, 0, sizeof state->action);
 }
 
 static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, const ivl_seen_t *seen)
@@ -188,7 +189,7 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
     case IVL_PHASE_FLIP:
         state->triggered = true;
         state->diag.n_trigger++;
-        ivl_trigger_latch(&state->snapshot, sample, seen, &state->policy);
+        state->snapshot = ivl_trigger_snapshot(sample, seen, state->policy.id, state->action);
         break;
     case IVL_PHASE_ABORTED:
         state->p_hold_W_m = sample->p_WB_m;
@@ -216,6 +217,10 @@ static void note_cause(ivl_state_t *state)
 
 static bool take_exit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
 {
+    if (state->phase == IVL_PHASE_APPROACH)
+    {
+        state->action = ivl_policy_decide(&state->policy, seen);
+    }
     state->guard.rule = (uint8_t)ivl_guard_find(cfg, state, seen);
     for (const exit_t *e = ROWS[state->phase].exits; e->when != NULL; e++)
     {

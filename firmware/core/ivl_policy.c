@@ -1,25 +1,58 @@
 /// @file ivl_policy.c
 #include "ivl_policy.h"
 
-static bool in_range(const ivl_cfg_t *cfg, const ivl_policy_t *policy)
+#include <string.h>
+
+#include "ivl_math.h"
+#include "ivl_wire.h"
+
+static const ivl_form_t *form_of(const ivl_policy_t *policy)
 {
-    return (policy->rrev_c_per_s >= 0.0f) && (policy->rrev_c_per_s <= cfg->rrev_c_per_s_max) && (policy->moment_y_Nm >= 0.0f) &&
-           (policy->moment_y_Nm <= cfg->moment_y_Nm_max);
+    const ivl_form_t *form = ivl_form(policy->id.form);
+    return ((form != NULL) && (policy->n == form->n_params)) ? form : NULL;
 }
 
-ivl_status_t ivl_policy_commit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy)
+uint32_t ivl_policy_crc(const ivl_policy_t *policy)
 {
-    const bool   open = !state->triggered || (state->phase == IVL_PHASE_IDLE);
-    ivl_status_t status = in_range(cfg, policy) ? IVL_OK : IVL_ERR_RANGE;
-    status = open ? status : IVL_ERR_PHASE;
-    if (status == IVL_OK)
+    const ivl_form_t *form = form_of(policy);
+    if (form == NULL)
     {
-        state->policy = *policy;
-        state->has_policy = true;
+        return 0u;
     }
-    else
+    uint32_t crc = ivl_wire_crc(0u, form->name, strlen(form->name));
+    for (uint32_t i = 0; i < policy->n; i++)
     {
-        state->diag.n_policy_refused++;
+        uint8_t bytes[4];
+        ivl_wire_put_f32(bytes, policy->theta[i]);
+        crc = ivl_wire_crc(crc, bytes, sizeof bytes);
     }
-    return status;
+    return crc;
+}
+
+ivl_status_t ivl_policy_check(const ivl_cfg_t *cfg, const ivl_policy_t *policy)
+{
+    const ivl_form_t *form = form_of(policy);
+    if (form == NULL)
+    {
+        return IVL_ERR_FORM;
+    }
+    bool good = true;
+    for (uint32_t i = 0; i < policy->n; i++)
+    {
+        // positive form, so that NaN is refused
+        good = good && (policy->theta[i] >= form->params[i].lo) && (policy->theta[i] <= form->params[i].hi);
+    }
+    return (good && (form->moment_most_Nm(policy->theta) <= cfg->flip_moment_Nm_max)) ? IVL_OK : IVL_ERR_RANGE;
+}
+
+ivl_action_t ivl_policy_decide(const ivl_policy_t *policy, const ivl_seen_t *seen)
+{
+    ivl_action_t      action = {.flip = false};
+    const ivl_form_t *form = ivl_form(policy->id.form);
+    if ((form != NULL) && seen->cues.valid && (seen->cues.rrev_per_s > 0.0f))
+    {
+        action = form->decide(policy->theta, seen);
+        action.flip = (action.flip || policy->at_once) && action.go;
+    }
+    return action;
 }

@@ -6,7 +6,7 @@
 #include "ivl_math.h"
 #include "ivl_wire.h"
 
-_Static_assert(sizeof(ivl_record_header_t) == 32u, "no padding in the header");
+_Static_assert(sizeof(ivl_record_header_t) == 36u, "no padding in the header");
 _Static_assert(sizeof(ivl_record_row_t) == 44u, "no padding in a row");
 _Static_assert(IVL_RECORD_ROWS_POST < IVL_RECORD_ROWS, "there is room for what was before the trigger");
 
@@ -91,6 +91,8 @@ static void append(ivl_recorder_t *recorder, const ivl_cfg_t *cfg, const ivl_sta
     {
         header->trigger_row = (uint16_t)(header->n_rows - 1u);
         header->policy_seq = state->snapshot.policy.seq;
+        header->policy_crc = state->snapshot.policy.crc;
+        header->policy_form = state->snapshot.policy.form;
         header->t_trigger_us = (uint32_t)state->snapshot.t_us;
     }
 }

@@ -1,13 +1,13 @@
 /// @file ivl_record.h
 /// Flight recorder around one flip: a ring of compact rows, one a tick, that freezes a while after the trigger and is then read as a memory.
-/// For the port; the pipeline does not use it.  The reader sees a header of 32 bytes, then the rows in order of time, all little-endian.
+/// For the port; the pipeline does not use it.  The reader sees a header of 36 bytes, then the rows in order of time, all little-endian.
 #ifndef IVL_RECORD_H
 #define IVL_RECORD_H
 #include "ivl.h"
 #include "ivl_wire.h"
 
 #define IVL_RECORD_MAGIC     0x524C5649u  ///< "IVLR"
-#define IVL_RECORD_VERSION   1u
+#define IVL_RECORD_VERSION   2u
 #define IVL_RECORD_ROWS      448u     ///< 0.9 s at 500 Hz in 19.7 kB
 #define IVL_RECORD_ROWS_POST 350u     ///< rows after the trigger; the others are from before it
 #define IVL_RECORD_NONE      0xFFFFu  ///< no row of the trigger
@@ -21,9 +21,10 @@
     X(u16, n_rows, "rows that follow")                                           \
     X(u16, trigger_row, "row of the trigger tick, IVL_RECORD_NONE if none")      \
     X(u8, frozen, "1: complete; 0: still recording, no row can be read")         \
-    X(u8, spare, "0")                                                            \
+    X(u8, policy_form, "its form")                                               \
     X(u32, n_cycle, "arm cycles since the start: changes with each recording")   \
     X(u32, policy_seq, "number of the policy that triggered")                    \
+    X(u32, policy_crc, "its checksum")                                           \
     X(f32, tick_hz, "rows per second")                                           \
     X(f32, thrust_N_max, "thrust that 255 stands for, N")                        \
     X(u32, t_trigger_us, "low 32 bits of snapshot.t_us")

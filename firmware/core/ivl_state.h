@@ -13,7 +13,7 @@ typedef struct
     uint32_t n_tick;
     uint32_t n_bad_pose;        ///< ticks whose sensed state was refused
     uint32_t n_bad_command;     ///< ticks whose command was refused
-    uint32_t n_policy_refused;  ///< policies refused: range or phase
+    uint32_t n_policy_refused;  ///< policies refused: form, range or phase
     uint32_t n_abort;           ///< entries into ABORTED
     uint32_t n_trigger;         ///< triggers fired
 } ivl_diag_t;
@@ -47,6 +47,7 @@ typedef struct
     ivl_derived_t  derived;
     ivl_sense_t    sense;
     ivl_policy_t   policy;
+    ivl_action_t   action;  ///< what the policy decided in the last tick of an approach
     ivl_approach_t approach;
     ivl_vec3_t     p_hold_W_m;  ///< where READY and ABORTED hover
     float          landed_s;    ///< ABORTED: how long the reference has been at land_height

@@ -40,6 +40,23 @@ ivl_status_t ivl_reconfigure(ivl_cfg_t *cfg, ivl_state_t *state, const ivl_cfg_t
     return status;
 }
 
+ivl_status_t ivl_policy_commit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy)
+{
+    const bool   open = !state->triggered || (state->phase == IVL_PHASE_IDLE);
+    ivl_status_t status = ivl_policy_check(cfg, policy);
+    status = open ? status : IVL_ERR_PHASE;
+    if (status == IVL_OK)
+    {
+        state->policy = *policy;
+        state->has_policy = true;
+    }
+    else
+    {
+        state->diag.n_policy_refused++;
+    }
+    return status;
+}
+
 static void count_faults(ivl_diag_t *diag, const ivl_sense_t *sense)
 {
     diag->n_bad_pose += sense->pose_fresh ? 0u : 1u;
@@ -82,7 +99,7 @@ static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, fl
         track(cfg, state, &ref, thrust_N);
         break;
     case IVL_DRIVE_FLIP:
-        ivl_maneuver_thrusts(cfg, state->snapshot.policy.moment_y_Nm, thrust_N);
+        ivl_maneuver_thrusts(cfg, state->snapshot.action.moment_Nm, thrust_N);
         break;
     case IVL_DRIVE_OFF:
     default:
@@ -127,7 +144,7 @@ void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_
         drive(cfg, state, what, seen.cues.rrev_per_s, out->thrust_N);
         ivl_pwm_of_thrust(cfg, out->thrust_N, out->pwm);
         const ivl_wrench_t made = ivl_mixer_wrench(cfg, out->thrust_N);
-        out->moment_y_Nm = made.moment_B_Nm.y;
+        out->pitch_moment_Nm = made.moment_B_Nm.y;
         out->thrust_total_N = made.thrust_N;
     }
 }

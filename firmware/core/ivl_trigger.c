@@ -1,14 +1,9 @@
 /// @file ivl_trigger.c
 #include "ivl_trigger.h"
 
-bool ivl_trigger_due(const ivl_policy_t *policy, ivl_cues_t cues)
+ivl_snapshot_t ivl_trigger_snapshot(const ivl_sample_t *sample, const ivl_seen_t *seen, ivl_policy_id_t policy, ivl_action_t action)
 {
-    return cues.valid && (cues.rrev_per_s > 0.0f) && (cues.rrev_per_s >= policy->rrev_c_per_s);
-}
-
-void ivl_trigger_latch(ivl_snapshot_t *snapshot, const ivl_sample_t *sample, const ivl_seen_t *seen, const ivl_policy_t *policy)
-{
-    *snapshot = (ivl_snapshot_t){
+    return (ivl_snapshot_t){
         .t_us = sample->t_us,
         .t_pose_us = sample->t_pose_us,
         .p_WB_m = sample->p_WB_m,
@@ -20,6 +15,7 @@ void ivl_trigger_latch(ivl_snapshot_t *snapshot, const ivl_sample_t *sample, con
         .d_sigma_m = seen->ceiling.d_sigma_m,
         .rrev_per_s = seen->cues.rrev_per_s,
         .of_y_radps = seen->cues.of_y_radps,
-        .policy = *policy,
+        .action = action,
+        .policy = policy,
     };
 }

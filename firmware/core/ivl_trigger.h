@@ -2,28 +2,26 @@
 /// Stage 4: the trigger.  Fires once per arm cycle and latches everything known at that tick.
 #ifndef IVL_TRIGGER_H
 #define IVL_TRIGGER_H
-#include "ivl_cues.h"
+#include "ivl_policy.h"
 
 /// The world as it was at the trigger tick; all zero before.
 typedef struct
 {
-    uint64_t     t_us;
-    uint64_t     t_pose_us;
-    ivl_vec3_t   p_WB_m;
-    ivl_vec3_t   v_WB_mps;
-    ivl_quat_t   q_WB;
-    ivl_vec3_t   w_B_radps;
-    ivl_vec3_t   f_B_mps2;
-    float        d_ceil_m;
-    float        d_sigma_m;
-    float        rrev_per_s;
-    float        of_y_radps;
-    ivl_policy_t policy;
+    uint64_t        t_us;
+    uint64_t        t_pose_us;
+    ivl_vec3_t      p_WB_m;
+    ivl_vec3_t      v_WB_mps;
+    ivl_quat_t      q_WB;
+    ivl_vec3_t      w_B_radps;
+    ivl_vec3_t      f_B_mps2;
+    float           d_ceil_m;
+    float           d_sigma_m;
+    float           rrev_per_s;
+    float           of_y_radps;
+    ivl_action_t    action;  ///< what the policy decided
+    ivl_policy_id_t policy;  ///< which one it was
 } ivl_snapshot_t;
 
-/// True if the cue is valid, the ceiling is closing in, and RREV has reached the policy's threshold.
-bool ivl_trigger_due(const ivl_policy_t *policy, ivl_cues_t cues);
-
-/// Latch the trigger tick.
-void ivl_trigger_latch(ivl_snapshot_t *snapshot, const ivl_sample_t *sample, const ivl_seen_t *seen, const ivl_policy_t *policy);
+/// The trigger tick as it is to be latched.
+ivl_snapshot_t ivl_trigger_snapshot(const ivl_sample_t *sample, const ivl_seen_t *seen, ivl_policy_id_t policy, ivl_action_t action);
 #endif  // IVL_TRIGGER_H

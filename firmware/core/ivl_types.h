@@ -22,7 +22,8 @@ typedef enum
 {
     IVL_OK = 0,
     IVL_ERR_RANGE = -1,  ///< a value is not finite or lies outside its stated range
-    IVL_ERR_PHASE = -2   ///< not allowed in the present phase (for example after the trigger)
+    IVL_ERR_PHASE = -2,  ///< not allowed in the present phase (for example after the trigger)
+    IVL_ERR_FORM = -4    ///< no such form of a policy here, or another number of parameters; -3 is of ivl_wire_status_t
 } ivl_status_t;
 
 /// Phases of one landing; the numbers are part of the log format.  The transitions stand in the table of ivl_phase.c.
@@ -48,14 +49,6 @@ typedef enum
     IVL_REQUEST_ABORT,
     IVL_REQUEST_COUNT
 } ivl_request_t;
-
-/// The learned action.
-typedef struct
-{
-    uint32_t seq;           ///< number given by the sender, echoed in the snapshot
-    float    rrev_c_per_s;  ///< trigger threshold of RREV; 0: the first tick with a valid closing cue triggers
-    float    moment_y_Nm;   ///< magnitude of the nose-up moment, >= 0
-} ivl_policy_t;
 
 /// Request of the operator with its arguments; only those arguments are checked that the request uses.
 typedef struct

@@ -53,8 +53,7 @@
     X(float, "ivl", "kf_b_sigma", kf_b_sigma_mps2, "m/s^2", 0.001, 10.0, 0.15, "filter: of the accelerometer's bias")                        \
     X(float, "ivl", "kf_q", kf_q_m2ps3, "m^2/s^3", 1.0e-6, 1.0, 5.0e-4, "filter: growth of the speed's variance in a second")                \
     X(float, "ivl", "kf_gate", kf_gate_norm, "1", 1.0, 100.0, 4.0, "filter: measurements further off than this many sigma are refused")      \
-    X(float, "ivl", "rrev_c_max", rrev_c_per_s_max, "1/s", 0.0, 20.0, 20.0, "largest trigger threshold that a policy may ask for")           \
-    X(float, "ivl", "moment_y_max", moment_y_Nm_max, "N m", 0.0, 0.02, 0.02, "largest moment that a policy may ask for")                     \
+    X(float, "ivl", "flip_moment_max", flip_moment_Nm_max, "N m", 0.0, 0.02, 0.02, "largest moment that a policy may ask for")                     \
     /* tracking controller [S] */                                                                                                            \
     X(float, "ivl", "kp_pos_xy", kp_pos_xy_Npm, "N/m", 0.0, 100.0, 0.5, "position gain, horizontal")                                         \
     X(float, "ivl", "kp_pos_z", kp_pos_z_Npm, "N/m", 0.0, 100.0, 1.2, "position gain, vertical")                                             \
@@ -130,7 +129,7 @@
     X(uint16_t, "ivl", "pwm3", ivl_out_t, pwm[2], "1", "PWM command, rear left")                                         \
     X(uint16_t, "ivl", "pwm4", ivl_out_t, pwm[3], "1", "PWM command, front left")                                        \
     X(float, "ivl", "thrust_total", ivl_out_t, thrust_total_N, "N", "sum of the thrust commands")                        \
-    X(float, "ivl", "moment_y", ivl_out_t, moment_y_Nm, "N m", "moment about b_y of the thrust commands")                \
+    X(float, "ivl", "pitch_moment", ivl_out_t, pitch_moment_Nm, "N m", "moment about b_y of the thrust commands")        \
     X(float, "ivl", "d_ceil", ivl_out_t, ceiling.d_ceil_m, "m", "distance to the ceiling, 0 if invalid")                 \
     X(float, "ivl", "d_age", ivl_out_t, ceiling.age_s, "s", "age of the distance")                                       \
     X(float, "ivl", "d_sigma", ivl_out_t, ceiling.d_sigma_m, "m", "standard deviation of the distance, 0 if invalid")    \
@@ -141,16 +140,20 @@
     X(float, "ivl", "kf_bias", ivl_state_t, distance.filter.b_mps2, "m/s^2", "filter: bias of the accelerometer")        \
     X(uint32_t, "ivl", "n_measured", ivl_state_t, distance.n_taken, "1", "measurements of this approach that were taken")\
     X(uint32_t, "ivl", "n_gated", ivl_state_t, distance.n_gated, "1", "measurements of this approach that were refused as too far off")\
-    X(uint32_t, "ivl", "policy_seq", ivl_state_t, policy.seq, "1", "number of the policy in use")                        \
-    X(float, "ivl", "rrev_c", ivl_state_t, policy.rrev_c_per_s, "1/s", "trigger threshold in use")                       \
-    X(float, "ivl", "moment_c", ivl_state_t, policy.moment_y_Nm, "N m", "moment in use")                                 \
+    X(uint32_t, "ivl", "policy_seq", ivl_state_t, policy.id.seq, "1", "number of the policy in use")                     \
+    X(uint32_t, "ivl", "policy_crc", ivl_state_t, policy.id.crc, "1", "its checksum")                                    \
+    X(uint8_t, "ivl", "policy_form", ivl_state_t, policy.id.form, "1", "its form")                                       \
+    X(uint8_t, "ivl", "go", ivl_state_t, action.go, "1", "1 if the policy expects a flip from here to land")             \
+    X(float, "ivl", "flip_moment", ivl_state_t, action.moment_Nm, "N m", "moment that the policy asks for")              \
     X(float, "ivl", "trg_d", ivl_state_t, snapshot.d_ceil_m, "m", "distance at the trigger")                             \
     X(float, "ivl", "trg_d_sigma", ivl_state_t, snapshot.d_sigma_m, "m", "standard deviation of the distance at the trigger")\
     X(float, "ivl", "trg_rrev", ivl_state_t, snapshot.rrev_per_s, "1/s", "RREV at the trigger")                          \
     X(float, "ivl", "trg_of_y", ivl_state_t, snapshot.of_y_radps, "rad/s", "ventral flow at the trigger")                \
     X(float, "ivl", "trg_vx", ivl_state_t, snapshot.v_WB_mps.x, "m/s", "velocity along W x at the trigger")              \
     X(float, "ivl", "trg_vz", ivl_state_t, snapshot.v_WB_mps.z, "m/s", "velocity along W z at the trigger")              \
+    X(float, "ivl", "trg_moment", ivl_state_t, snapshot.action.moment_Nm, "N m", "moment of the flip")                   \
     X(uint32_t, "ivl", "trg_seq", ivl_state_t, snapshot.policy.seq, "1", "number of the policy that triggered")          \
+    X(uint32_t, "ivl", "trg_crc", ivl_state_t, snapshot.policy.crc, "1", "its checksum")                                 \
     X(uint32_t, "ivl", "n_tick", ivl_state_t, diag.n_tick, "1", "ticks since ivl_init")                                  \
     X(uint32_t, "ivl", "n_bad_pose", ivl_state_t, diag.n_bad_pose, "1", "ticks with an unusable sensed state")           \
     X(uint32_t, "ivl", "n_bad_cmd", ivl_state_t, diag.n_bad_command, "1", "ticks with an unusable command")              \

@@ -38,6 +38,11 @@ static float f32_of_bits(uint32_t bits)
     return x;
 }
 
+void ivl_wire_put_f32(uint8_t *bytes, float value)
+{
+    (void)put_bytes(bytes, bits_of_f32(value), sizeof value);
+}
+
 #define BITS_u8(x)  (x)
 #define BITS_u16(x) (x)
 #define BITS_u32(x) (x)

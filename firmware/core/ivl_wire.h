@@ -6,8 +6,9 @@
 #define IVL_WIRE_H
 #include "ivl_types.h"
 
-#define IVL_WIRE_VERSION  1u
+#define IVL_WIRE_VERSION  2u
 #define IVL_WIRE_SIZE_MAX 30u
+#define IVL_WIRE_THETAS   4u  ///< parameters of a policy in one packet
 
 /// Names of the member types in the tables below.
 typedef uint8_t  ivl_u8_t;
@@ -18,11 +19,17 @@ typedef int16_t  ivl_i16_t;
 typedef float    ivl_f32_t;
 
 // clang-format off
-/// Host to vehicle, type 0x01: the learned action, to be put in force.
+/// Host to vehicle, type 0x01: a part of a policy, which is put in force when all of its parts have come.
 #define IVL_WIRE_POLICY(X)                                                       \
     X(u32, seq, "1", "number given by the host")                                 \
-    X(f32, rrev_c_per_s, "1/s", "trigger threshold")                             \
-    X(f32, moment_y_Nm, "N m", "magnitude of the nose-up moment")
+    X(u32, crc, "1", "of the whole policy: ivl_policy_crc")                      \
+    X(u8, form, "1", "row of IVL_FORMS")                                         \
+    X(u8, n, "1", "parameters of the policy")                                    \
+    X(u8, part, "1", "this is number `part` of n / 4 parts, rounded up, from 0") \
+    X(f32, theta0, "SI", "parameter 4 part")                                     \
+    X(f32, theta1, "SI", "the next one; 0 if there is none")                     \
+    X(f32, theta2, "SI", "the next one; 0 if there is none")                     \
+    X(f32, theta3, "SI", "the next one; 0 if there is none")
 
 /// Host to vehicle, type 0x02: what the operator wants; repeated, it is the heartbeat.
 #define IVL_WIRE_COMMAND(X)                                                      \
@@ -41,13 +48,14 @@ typedef float    ivl_f32_t;
     X(f32, rrev_per_s, "1/s", "positive while the ceiling comes closer")         \
     X(f32, of_y_radps, "rad/s", "OF_y, without the body's rotation")
 
-/// Vehicle to host, type 0x81: answer to 0x01, with what is in force after it.
+/// Vehicle to host, type 0x81: answer to the last part of 0x01, or to the one that made it whole, with what is in force after it.
 #define IVL_WIRE_POLICY_ECHO(X)                                                  \
     X(u32, seq, "1", "number of the packet that is answered")                    \
     X(i8, status, "1", "ivl_wire_status_t")                                      \
+    X(u16, missing, "1", "ERR_INCOMPLETE: bit i is set if part i has not come")  \
     X(u32, seq_in_force, "1", "number of the policy in force, 0 if none is")     \
-    X(f32, rrev_c_per_s, "1/s", "in force")                                      \
-    X(f32, moment_y_Nm, "N m", "in force")
+    X(u32, crc_in_force, "1", "its checksum")                                    \
+    X(u8, form_in_force, "1", "its form")
 
 /// Vehicle to host, type 0x82: answer to 0x02.
 #define IVL_WIRE_COMMAND_ECHO(X)                                                 \
@@ -89,7 +97,10 @@ typedef enum
     IVL_WIRE_OK = IVL_OK,
     IVL_WIRE_ERR_RANGE = IVL_ERR_RANGE,
     IVL_WIRE_ERR_PHASE = IVL_ERR_PHASE,
-    IVL_WIRE_ERR_NO_CONTROLLER = -3  ///< the core does not run: another controller is selected
+    IVL_WIRE_ERR_NO_CONTROLLER = -3,  ///< the core does not run: another controller is selected
+    IVL_WIRE_ERR_FORM = IVL_ERR_FORM,
+    IVL_WIRE_ERR_CRC = -5,        ///< the parts of a policy do not have the checksum that they state: nothing is in force of it
+    IVL_WIRE_ERR_INCOMPLETE = -6  ///< parts of the policy have not come
 } ivl_wire_status_t;
 
 #define IVL_WIRE_MEMBER(type, name, unit, doc) ivl_##type##_t name;
@@ -136,6 +147,9 @@ bool ivl_wire_get_reading(const uint8_t *bytes, size_t size, ivl_wire_reading_t 
 bool ivl_wire_get_policy_echo(const uint8_t *bytes, size_t size, ivl_wire_policy_echo_t *packet);
 bool ivl_wire_get_command_echo(const uint8_t *bytes, size_t size, ivl_wire_command_echo_t *packet);
 bool ivl_wire_get_config_echo(const uint8_t *bytes, size_t size, ivl_wire_config_echo_t *packet);
+
+/// A float in four bytes, little-endian.
+void ivl_wire_put_f32(uint8_t *bytes, float value);
 
 /// CRC-32 (reflected, polynomial 0xEDB88320, as in zip files) of bytes that follow those behind `crc`; start with crc 0.
 uint32_t ivl_wire_crc(uint32_t crc, const void *data, size_t size);

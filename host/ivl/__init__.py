@@ -2,7 +2,7 @@
 
 import ivl
 world = ivl.World(vehicle="habas2021", gear="wide_long", gear_set="as_simulated")
-out = world.rollouts(2.5, 90.0, rrev_c_per_s=4.8, moment_y_Nmm=8.0)
+out = world.rollouts(2.5, 90.0, 4.8, 8.0)
 """
 
 import os

@@ -11,16 +11,16 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ivl import model, native, sensing, yamlfile
-from ivl.errors import ConfigError, LearnerError
+from ivl import forms, model, native, sensing, yamlfile
+from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
 from ivl.reward import REWARDS, RewardOptions
 from ivl.world import World
 
 PACKAGE_DIR = Path(__file__).parent
 EXPERIMENTS_DIR = PACKAGE_DIR / "experiments"
-POLICY = ("rrev_c_per_s", "moment_y_Nmm")
-"""Names of the two policy parameters, in the order of every theta."""
+GRID_DIMENSIONS_MAX = 2
+"""The best possible policy of a form with more parameters is looked for without a grid."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Bounds = Annotated[list[Finite], Field(min_length=2, max_length=2)]
@@ -48,11 +48,53 @@ class PolicyParameter(Strict):
     bounds: Bounds
 
 
-class Policy(Strict):
-    """The learned parameters: trigger threshold RREV_c (1/s) and moment M_yd (N mm)."""
+class PerParameter(Strict):
+    """Base of what has one field for each parameter of the policy's form, beside its own fields."""
 
-    rrev_c_per_s: PolicyParameter
-    moment_y_Nmm: PolicyParameter
+    model_config = ConfigDict(strict=True, extra="allow", frozen=True)
+    __pydantic_extra__: dict[str, Any] = Field(init=False)
+
+    def of(self, form: forms.Form, where: str) -> list[Any]:
+        """The fields of a form's parameters, in its order.
+
+        Raises:
+            ConfigError: One is missing, or one is of no parameter.
+        """
+        given = self.__pydantic_extra__
+        missing = [name for name in form.names if name not in given]
+        unknown = [name for name in given if name not in form.names]
+        if missing or unknown:
+            what = f"{unknown[0]}: no such field" if unknown else f"{missing[0]}: must be given"
+            raise ConfigError(f"{where}.{what} (the form {form.name} has {', '.join(form.names)})")
+        return [given[name] for name in form.names]
+
+
+class Policy(PerParameter):
+    """The learned parameters: a form of the flight core, and for each of its parameters where the search begins."""
+
+    __pydantic_extra__: dict[str, PolicyParameter] = Field(init=False)
+    form: str = Field(default=forms.PAPER, description="form of the policy")
+
+    @property
+    def shape(self) -> forms.Form:
+        """The form, as the flight core describes it."""
+        return forms.by_name(self.form)
+
+    @property
+    def parameters(self) -> list[PolicyParameter]:
+        """Where the search for each parameter begins, in the order of every theta."""
+        found: list[PolicyParameter] = self.of(self.shape, "policy")
+        return found
+
+    @property
+    def mu0(self) -> list[float]:
+        """Where the search begins, one value a parameter."""
+        return [p.mu0 for p in self.parameters]
+
+    @property
+    def bounds(self) -> list[list[float]]:
+        """Bounds of the search, one pair a parameter."""
+        return [p.bounds for p in self.parameters]
 
 
 class LearnerChoice(Strict):
@@ -94,23 +136,22 @@ class Check(Strict):
 
     n_fresh: int = Field(default=200, ge=1, le=100_000, description="rollouts that judge one recommended policy")
     share_of_best: Finite = Field(default=0.9, gt=0, le=1, description="share of the best possible rate that solves")
-    rrev_c_per_s: GridAxis = GridAxis(lo=0.5, hi=10.0, step=0.05)
     effort: Finite = Field(default=1.0, gt=0, le=100, description="factor on the rollouts of the search for the best")
-    moment_y_Nmm: GridAxis = GridAxis(lo=1.0, hi=11.0, step=0.5)
+    grid: dict[str, GridAxis] = Field(
+        default_factory=dict, description="grid of the search, by parameter; none: spans the bounds of the policy"
+    )
 
 
-class Flown(Strict):
+class Flown(PerParameter):
     """Policies that landed on a real vehicle: drawn beside what is learned, known to no learner."""
 
+    __pydantic_extra__: dict[str, Bounds] = Field(init=False)
     label: str = Field(min_length=1)
-    rrev_c_per_s: Bounds
-    moment_y_Nmm: Bounds
     source: str = Field(min_length=1)
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        for name in POLICY:
-            lo, hi = getattr(self, name)
+        for name, (lo, hi) in self.__pydantic_extra__.items():
             if not lo <= hi:
                 raise ValueError(f"{name}: {lo} must not be above {hi}")
         return self
@@ -164,7 +205,7 @@ class Experiment(Strict):
 
     def make_learner(self, seed: int) -> Learner:
         """A new learner at the start of its search."""
-        parameters = [getattr(self.policy, name) for name in POLICY]
+        parameters = self.policy.parameters
         return make_learner(
             self.learner.name,
             [p.mu0 for p in parameters],
@@ -212,11 +253,31 @@ def from_data(data: Any, label: str) -> Experiment:
     """Check plain data; `label` names it in errors."""
     experiment = yamlfile.validate(Experiment, data, label)
     check_overrides(experiment.overrides, label)
+    check_policy(experiment, label)
     try:
         experiment.make_learner(seed=0)
     except LearnerError as error:
         raise ConfigError(f"{label}: {error}") from error
     return experiment
+
+
+def check_policy(experiment: Experiment, label: str) -> None:
+    """Check everything that names parameters of the policy against its form; `label` names the file in errors."""
+    try:
+        form = experiment.policy.shape
+        for p, (lo, hi) in zip(form.params, experiment.policy.bounds, strict=True):
+            if not p.lo <= lo < hi <= p.hi:
+                raise ConfigError(
+                    f"policy.{p.name}.bounds: [{lo:g}, {hi:g}] (allowed within {p.lo:g} .. {p.hi:g} {p.unit})"
+                )
+        for flown in experiment.flown:
+            flown.of(form, f"flown.{flown.label}")
+        for name in experiment.check.grid:
+            if name not in form.names or form.n > GRID_DIMENSIONS_MAX:
+                allowed = ", ".join(form.names) if form.n <= GRID_DIMENSIONS_MAX else "none: the form has too many"
+                raise ConfigError(f"check.grid.{name}: no axis of this name (allowed {allowed})")
+    except (ArgumentError, ConfigError) as error:
+        raise ConfigError(f"{label}: {error}") from error
 
 
 def parse_setting(setting: str) -> tuple[str, Any]:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from ivl.errors import NativeError
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 LIBRARY_ENV = "IVL_NATIVE_LIBRARY"  # another build of the library, for example one with sanitizers
 DEFAULT_LIBRARY = Path(__file__).parent / "_native" / "libivl_sil.so"
 
@@ -143,6 +143,28 @@ class NativeLibrary:
         """Build a native model from the parameter vector (order of `params`)."""
         return NativeModel(self, values)
 
+    def forms(self) -> list[tuple[str, str, tuple[Field, ...]]]:
+        """Forms of policies by number: name, description, and parameters (range in SI; `default`: one unit in SI)."""
+        found: list[tuple[str, str, tuple[Field, ...]]] = []
+        name, doc = ctypes.c_char_p(), ctypes.c_char_p()
+        while n := self._c.ivl_sil_form(len(found), ctypes.byref(name), ctypes.byref(doc)):
+            rows = [_CField() for _ in range(n)]
+            for i, row in enumerate(rows):
+                self._c.ivl_sil_form_param(len(found), i, ctypes.byref(row))
+            found.append((_text(name), _text(doc), tuple(_field(row) for row in rows)))
+        return found
+
+    def policy_crc(self, form: int, theta_si: npt.NDArray[np.float64]) -> int:
+        """Checksum of a policy: number of its form, and its parameters in SI units."""
+        theta = self.theta(theta_si)
+        return int(self._c.ivl_sil_policy_crc(form, _pointer(theta)))
+
+    def theta(self, theta_si: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Parameters with zeros behind them, as many as the library takes."""
+        theta = np.zeros(self.spec_fields["theta"].count)
+        theta[: theta_si.size] = theta_si
+        return theta
+
     def end_reason(self, code: int) -> str:
         """Name of an outcome's `end_reason`."""
         return bytes(self._c.ivl_sil_end_reason(code)).decode()
@@ -195,14 +217,22 @@ class NativeModel:
         crc = self._library._c.ivl_sil_model_config(self._handle, _pointer(record))
         return record, int(crc)
 
+    def accepts(self, form: int, theta_si: npt.NDArray[np.float64]) -> bool:
+        """Whether a flight core with this configuration puts a policy in force: form and parameters in SI units."""
+        theta = self._library.theta(theta_si)
+        return bool(self._library._c.ivl_sil_policy_accepted(self._handle, form, _pointer(theta)))
+
     def replay(
-        self, config: npt.NDArray[np.void], policy: tuple[float, float], inputs: npt.NDArray[np.void]
+        self,
+        config: npt.NDArray[np.void],
+        policy: tuple[int, npt.NDArray[np.float64]],
+        inputs: npt.NDArray[np.void],
     ) -> tuple[npt.NDArray[np.void], str]:
         """Step a fresh flight core through recorded inputs, where this model's core runs.
 
         Args:
             config: Configuration, one record as `config()` gives it.
-            policy: RREV_c in 1/s and M_yd in N m.
+            policy: Number of its form, and its parameters in SI units.
             inputs: One record of `replay_in_dtype` a tick.
 
         Returns:
@@ -211,7 +241,10 @@ class NativeModel:
         inputs = np.ascontiguousarray(inputs)
         rows = np.zeros(inputs.shape, dtype=self._library.replay_out_dtype)
         call = self._library._c.ivl_sil_replay
-        status = int(call(self._handle, _pointer(config), *policy, _pointer(inputs), inputs.size, _pointer(rows)))
+        form, theta = policy[0], self._library.theta(policy[1])
+        status = int(
+            call(self._handle, _pointer(config), form, _pointer(theta), _pointer(inputs), inputs.size, _pointer(rows))
+        )
         return rows, _REFUSED[status]
 
     def rollouts(self, specs: npt.NDArray[np.void], n_threads: int) -> npt.NDArray[np.void]:
@@ -296,7 +329,11 @@ def _declare(c: Any) -> None:
         ("ivl_sil_model_derived", None, (ptr, ptr)),
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
-        ("ivl_sil_replay", c_int, (ptr, ptr, ctypes.c_float, ctypes.c_float, ptr, size, ptr)),
+        ("ivl_sil_replay", c_int, (ptr, ptr, c_int, ptr, ptr, size, ptr)),
+        ("ivl_sil_form", ctypes.c_uint32, (c_int, ctypes.POINTER(ctypes.c_char_p), ctypes.POINTER(ctypes.c_char_p))),
+        ("ivl_sil_form_param", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField))),
+        ("ivl_sil_policy_accepted", c_int, (ptr, c_int, ptr)),
+        ("ivl_sil_policy_crc", ctypes.c_uint32, (c_int, ptr)),
         ("ivl_sil_hover", c_int, (ptr, ptr, size, ptr, size, double, ptr, size)),
         ("ivl_sil_end_reason", ctypes.c_char_p, (c_int,)),
         ("ivl_sil_rule_name", ctypes.c_char_p, (c_int,)),
@@ -307,6 +344,10 @@ def _declare(c: Any) -> None:
     ):
         function = getattr(c, name)
         function.restype, function.argtypes = restype, list(argtypes)
+
+
+def _text(pointer: ctypes.c_char_p) -> str:
+    return (pointer.value or b"").decode()
 
 
 def _field(row: _CField) -> Field:

@@ -1,7 +1,7 @@
 """The simulated world: one vehicle with one landing gear, and batches of rollouts in it.
 
     world = ivl.World(vehicle="habas2021", gear="wide_long", gear_set="as_simulated", **{"sense.latency": 0.01})
-    out = world.rollouts(2.5, 90.0, rrev_c_per_s=np.linspace(3, 6, 100), moment_y_Nmm=8.0)
+    out = world.rollouts(2.5, 90.0, np.linspace(3, 6, 100), 8.0)  # a policy: RREV_c (1/s) and M_yd (N mm)
     print((out.n_legs >= 3).mean())
 
 A rollout is a pure function of the world, its arguments, `seed` and `stream`: the same bits alone or among a million,
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ivl import model, native
+from ivl import forms, model, native
 from ivl.errors import ArgumentError, NativeError
 
 START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2, "state": 3}
@@ -187,8 +187,8 @@ class World:
         self,
         speed_mps: FloatLike,
         angle_deg: FloatLike,
-        rrev_c_per_s: FloatLike,
-        moment_y_Nmm: FloatLike,
+        *theta: FloatLike,
+        form: str = forms.PAPER,
         seed: npt.ArrayLike = 0,
         start: str = "imparted",
         d_ceil_m: FloatLike | None = None,
@@ -201,11 +201,12 @@ class World:
         Args:
             speed_mps: Approach speed, m/s.
             angle_deg: Approach angle above the horizontal, degrees.
-            rrev_c_per_s: Trigger threshold RREV_c, 1/s.
-            moment_y_Nmm: Magnitude of the nose-up body moment M_yd, N mm.
+            *theta: The policy: one argument for each parameter of its form, in the form's order and units. For the
+                paper's form: trigger threshold RREV_c (1/s), nose-up moment M_yd (N mm).
+            form: Form of the policy.
             seed: Seed of the random numbers, 0 .. 2^64 - 1.
             start: "imparted" (at the approach velocity), "flown" (from hover), "at_trigger" (moment commanded at
-                once) or "state" (from the state of free flight in `state`; RREV_c = 0 flips at once).
+                once) or "state" (from the state of free flight in `state`; a threshold of 0 flips at once).
             d_ceil_m: Distance to the ceiling at the start, m; for "at_trigger" alone, which needs it.
             threads: Worker threads; omitted: all processors.
             stream: Number of the rollout within its seed; omitted: the flat index in this call.
@@ -218,8 +219,7 @@ class World:
             ArgumentError: An argument is not finite, out of range, or does not broadcast.
         """
         specs, shape = self._specs(
-            start, stream, state, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
-            moment_y_Nmm=moment_y_Nmm, d_ceil_m=d_ceil_m, seed=seed,
+            start, stream, state, form, theta, speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         n_threads = _check_threads(threads)
         outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
@@ -232,8 +232,8 @@ class World:
         self,
         speed_mps: float,
         angle_deg: float,
-        rrev_c_per_s: float,
-        moment_y_Nmm: float,
+        *theta: float,
+        form: str = forms.PAPER,
         seed: int = 0,
         start: str = "imparted",
         d_ceil_m: float | None = None,
@@ -243,8 +243,7 @@ class World:
     ) -> Trace:
         """Fly one rollout and record it every `period_s` seconds (arguments and errors as `rollouts`, scalars only)."""
         specs, shape = self._specs(
-            start, stream, state, speed_mps=speed_mps, angle_deg=angle_deg, rrev_c_per_s=rrev_c_per_s,
-            moment_y_Nmm=moment_y_Nmm, d_ceil_m=d_ceil_m, seed=seed,
+            start, stream, state, form, theta, speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         if shape != ():
             raise ArgumentError(f"trace: the arguments must be scalars, they broadcast to {shape}")
@@ -310,7 +309,13 @@ class World:
         return points
 
     def _specs(
-        self, start: str, stream: npt.ArrayLike | None, state: State | None, **arguments: npt.ArrayLike | None
+        self,
+        start: str,
+        stream: npt.ArrayLike | None,
+        state: State | None,
+        form_name: str,
+        theta: tuple[npt.ArrayLike, ...],
+        **arguments: npt.ArrayLike | None,
     ) -> tuple[npt.NDArray[np.void], tuple[int, ...]]:
         """Checked, broadcast and flattened rollout specifications, and the shape they had."""
         if start not in START_CODES:
@@ -324,6 +329,8 @@ class World:
         if stream is not None:
             given["stream"] = _numbers("stream", stream)
         given |= state.fields() if state is not None else {}
+        form = forms.by_name(form_name)
+        given["theta"] = self._theta(form, theta)
         vectors = {n for n in given if n in self._library.spec_fields and self._library.spec_fields[n].count > 1}
         shapes = {name: array.shape[:-1] if name in vectors else array.shape for name, array in given.items()}
         try:
@@ -332,13 +339,29 @@ class World:
             named = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
             raise ArgumentError(f"the arguments do not broadcast: {named}") from error
         specs = self._library.default_specs(int(np.prod(shape, dtype=np.int64)))
-        specs["start"] = START_CODES[start]
+        specs["start"], specs["form"] = START_CODES[start], form.number
         specs["stream"] = np.arange(specs.size, dtype=np.uint64)
         for name, array in given.items():
             self._check_range(name, array)
             whole = (*shape, array.shape[-1]) if name in vectors else shape
             specs[name] = np.broadcast_to(array, whole).reshape(specs[name].shape)
         return specs, shape
+
+    def _theta(self, form: forms.Form, theta: tuple[npt.ArrayLike, ...]) -> FloatArray:
+        """Parameters in SI units with zeros behind them, shape (..., 64)."""
+        if len(theta) != form.n:
+            raise ArgumentError(
+                f"a policy of the form {form.name} has {form.n} parameters ({', '.join(form.names)}), {len(theta)} are given"
+            )
+        columns = [_numbers(name, value) for name, value in zip(form.names, theta, strict=True)]
+        try:
+            values = form.to_si(np.stack(np.broadcast_arrays(*columns), axis=-1))
+        except ValueError as error:
+            shapes = ", ".join(f"{name} {column.shape}" for name, column in zip(form.names, columns, strict=True))
+            raise ArgumentError(f"the arguments do not broadcast: {shapes}") from error
+        padded = np.zeros((*values.shape[:-1], self._library.spec_fields["theta"].count))
+        padded[..., : form.n] = values
+        return padded
 
     def _check_range(self, name: str, array: npt.NDArray[Any]) -> None:
         if array.dtype == np.uint64:

@@ -26,17 +26,21 @@ static ivl_sim_spec_t spec_of(const ivl_cf_settings_t *set)
     const ivl_command_t *cmd = &ivl_app.in.cmd;
     const ivl_policy_t  *policy = &ivl_app.state.policy;
     const float          angle_rad = (float)(set->angle_deg * (IVL_SIM_PI / 180.0));
-    return (ivl_sim_spec_t){
+    ivl_sim_spec_t       spec = {
         .speed_mps = {exact(set->speed_mps, (float)set->speed_mps, cmd->speed_mps)},
         .angle_deg = {(angle_rad >= cmd->angle_rad && angle_rad <= cmd->angle_rad) ? set->angle_deg
                                                                                    : (double)cmd->angle_rad * (180.0 / IVL_SIM_PI)},
-        .rrev_c_per_s = {(double)policy->rrev_c_per_s},
-        .moment_y_Nmm = {(double)policy->moment_y_Nm * 1.0e3},
         .d_ceil_m = {set->d_ceil_m},
         .seed = {seed_of(set)},
         .stream = {stream_of(set)},
         .start = {set->start},
+        .form = {policy->id.form},
     };
+    for (uint32_t i = 0; i < policy->n; i++)
+    {
+        spec.theta[i] = (double)policy->theta[i];
+    }
+    return spec;
 }
 
 static void end(ivl_cf_t *cf)
@@ -67,7 +71,7 @@ void ivl_cf_episode_begin(ivl_cf_t *cf)
     e->number++;
     e->running = true;
     e->ended = 0;
-    e->policy_seq = ivl_app.state.policy.seq;
+    e->policy_seq = ivl_app.state.policy.id.seq;
     e->draws[0] = seed_of(&cf->set);
     e->draws[1] = stream_of(&cf->set);
     ivl_sim_outcome_clear(&e->now);

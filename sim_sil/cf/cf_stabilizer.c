@@ -37,7 +37,7 @@ static ivl_status_t commit(void *port, int lane, const ivl_cfg_t *cfg, ivl_state
 {
     (void)port, (void)lane, (void)cfg;
     ivl_policy_t wanted = *policy;
-    wanted.seq = ivl_app.state.policy.seq;
+    wanted.id.seq = ivl_app.state.policy.id.seq;
     const ivl_status_t status = ivl_policy_commit(&ivl_app.cfg, &ivl_app.state, &wanted);
     *state = ivl_app.state;
     return status;

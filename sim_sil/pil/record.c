@@ -306,11 +306,24 @@ static ivl_status_t commit(void *port, int lane, const ivl_cfg_t *cfg, ivl_state
 /// Someone sends a policy in the middle of a landing; it may be good or not.
 static void commit_another(recorder_t *r, int lane, ivl_state_t *state)
 {
-    ivl_policy_t policy = {.seq = below(r, 1000), .rrev_c_per_s = between(r, -1.0f, 21.0f), .moment_y_Nm = between(r, -0.001f, 0.022f)};
+    ivl_policy_t policy = state->policy;
+    policy.id.seq = below(r, 1000);
+    policy.at_once = false;
+    for (uint32_t i = 0; i < policy.n; i++)
+    {
+        const ivl_form_param_t *param = &ivl_form(policy.id.form)->params[i];
+        const float             beyond = 0.07f * (param->hi - param->lo);
+        policy.theta[i] = between(r, param->lo - beyond, param->hi + beyond);
+    }
     if (chance(r, 0.2))
     {
-        policy.moment_y_Nm = NUMBERS[below(r, sizeof NUMBERS / sizeof NUMBERS[0])];
+        policy.theta[below(r, IVL_FORM_PARAMS_MAX)] = NUMBERS[below(r, sizeof NUMBERS / sizeof NUMBERS[0])];
     }
+    if (chance(r, 0.1))
+    {
+        policy.id.form = (uint8_t)below(r, 256);
+    }
+    policy.id.crc = ivl_policy_crc(&policy);
     (void)commit(r, lane, &r->cfg[lane], state, &policy);
 }
 

@@ -8,6 +8,7 @@
 #include "app_ivl.h"
 #include "controller.h"
 #include "ivl_cfg_name.h"
+#include "policy_fixture.h"
 #include "sdk_double.h"
 #include "unity.h"
 
@@ -68,15 +69,20 @@ static void handle(const uint8_t *bytes, size_t size)
     }
 }
 
-static ivl_wire_policy_echo_t send_policy(uint32_t seq, float rrev, float moment)
+static ivl_wire_policy_echo_t send_part(const ivl_wire_policy_t *packet)
 {
-    const ivl_wire_policy_t packet = {seq, rrev, moment};
-    uint8_t                 bytes[IVL_WIRE_SIZE_MAX];
-    handle(bytes, ivl_wire_put_policy(bytes, &packet));
+    uint8_t bytes[IVL_WIRE_SIZE_MAX];
+    handle(bytes, ivl_wire_put_policy(bytes, packet));
     ivl_wire_policy_echo_t echo = {0};
     TEST_ASSERT_TRUE(ivl_wire_get_policy_echo(last_sent()->bytes, last_sent()->size, &echo));
-    TEST_ASSERT_EQUAL_UINT32(seq, echo.seq);
+    TEST_ASSERT_EQUAL_UINT32(packet->seq, echo.seq);
     return echo;
+}
+
+static ivl_wire_policy_echo_t send_policy(uint32_t seq, float rrev, float moment)
+{
+    const ivl_wire_policy_t packet = constant_packet(seq, rrev, moment);
+    return send_part(&packet);
 }
 
 static ivl_wire_command_echo_t send_command(ivl_request_t request)
@@ -181,7 +187,7 @@ static void test_positive_gyro_y_and_positive_core_moment_both_push_the_nose_dow
     // a rate sensed nose down makes a moment nose up: the front pair pushes harder
     (void)send_command(IVL_REQUEST_HOVER);
     sdk_double_run(10);
-    TEST_ASSERT_TRUE(ivl_app.out.moment_y_Nm < -1.0e-4f);
+    TEST_ASSERT_TRUE(ivl_app.out.pitch_moment_Nm < -1.0e-4f);
     TEST_ASSERT_TRUE(sdk.control.normalizedForces[0] > sdk.control.normalizedForces[1]);
     TEST_ASSERT_TRUE(sdk.control.normalizedForces[3] > sdk.control.normalizedForces[2]);
 }
@@ -691,7 +697,7 @@ static void test_message_of_a_deck_that_is_no_reading_is_counted_and_commands_no
 {
     start_in_flight();
     CPXPacket_t              message = {.route = {.source = CPX_T_GAP8, .function = CPX_F_APP}};
-    const ivl_wire_policy_t  policy = {99, 1.0f, 0.001f};
+    const ivl_wire_policy_t  policy = constant_packet(99, 1.0f, 0.001f);
     const ivl_wire_command_t command = {.seq = 1, .request = IVL_REQUEST_HOVER};
     sdk.n_sent = 0;
     message.dataLength = (uint16_t)ivl_wire_put_policy(message.data, &policy);
@@ -704,7 +710,7 @@ static void test_message_of_a_deck_that_is_no_reading_is_counted_and_commands_no
     run_task(3);
     assert_counts(0, 3);
     assert_phase(IVL_PHASE_IDLE);
-    TEST_ASSERT_EQUAL_UINT32(11, ivl_app.state.policy.seq);
+    TEST_ASSERT_EQUAL_UINT32(11, ivl_app.state.policy.id.seq);
     TEST_ASSERT_EQUAL_INT(0, sdk.n_sent);
 }
 
@@ -735,8 +741,9 @@ static void test_policy_is_echoed_as_it_is_in_force(void)
     ivl_wire_policy_echo_t echo = send_policy(42, 4.5f, 0.0075f);
     TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, echo.status);
     TEST_ASSERT_EQUAL_UINT32(42, echo.seq_in_force);
-    TEST_ASSERT_FLOAT_WITHIN(0.0f, 4.5f, echo.rrev_c_per_s);
-    TEST_ASSERT_FLOAT_WITHIN(0.0f, 0.0075f, echo.moment_y_Nm);
+    const uint32_t crc = constant_packet(42, 4.5f, 0.0075f).crc;
+    TEST_ASSERT_EQUAL_HEX32(crc, echo.crc_in_force);
+    TEST_ASSERT_EQUAL_UINT8(0, echo.form_in_force);
     // refused: the old one stays
     const float bad[][2] = {{NAN, 0.008f}, {4.0f, NAN}, {-1.0f, 0.008f}, {4.0f, 0.021f}, {INFINITY, 0.008f}};
     for (int i = 0; i < 5; i++)
@@ -744,9 +751,29 @@ static void test_policy_is_echoed_as_it_is_in_force(void)
         echo = send_policy(43, bad[i][0], bad[i][1]);
         TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_RANGE, echo.status);
         TEST_ASSERT_EQUAL_UINT32(42, echo.seq_in_force);
-        TEST_ASSERT_FLOAT_WITHIN(0.0f, 4.5f, echo.rrev_c_per_s);
+        TEST_ASSERT_EQUAL_HEX32(crc, echo.crc_in_force);
     }
     TEST_ASSERT_TRUE(sdk_double_read_log("n_refused") == 5.0);
+}
+
+static void test_policy_with_a_wrong_checksum_or_form_is_refused(void)
+{
+    start();
+    (void)send_policy(42, 4.5f, 0.0075f);
+    ivl_wire_policy_t packet = constant_packet(43, 5.0f, 0.0075f);
+    packet.theta0 = 5.1f;
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_CRC, send_part(&packet).status);
+    packet = constant_packet(43, 5.0f, 0.0075f);
+    packet.form = 200u;
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_FORM, send_part(&packet).status);
+    packet.form = 0u;
+    packet.n = 3u;
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_FORM, send_part(&packet).status);
+    packet.n = 2u;
+    packet.part = 1u;
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_RANGE, send_part(&packet).status);
+    TEST_ASSERT_EQUAL_UINT32(42, send_part(&packet).seq_in_force);
+    TEST_ASSERT_EQUAL_UINT32(42, ivl_app.state.policy.id.seq);
 }
 
 static void test_policy_after_the_trigger_is_refused(void)
@@ -754,7 +781,7 @@ static void test_policy_after_the_trigger_is_refused(void)
     start_ready();
     flip();
     TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_PHASE, send_policy(99, 3.0f, 0.005f).status);
-    TEST_ASSERT_EQUAL_UINT32(11, ivl_app.state.policy.seq);
+    TEST_ASSERT_EQUAL_UINT32(11, ivl_app.state.policy.id.seq);
 }
 
 static void test_packets_are_answered_and_not_kept_when_another_controller_is_selected(void)
@@ -791,11 +818,11 @@ static void test_packets_arrive_through_the_task(void)
 {
     start();
     sdk.n_sent = 0;
-    const ivl_wire_policy_t packet = {8, 5.0f, 0.006f};
+    const ivl_wire_policy_t packet = constant_packet(8, 5.0f, 0.006f);
     sdk.incoming.size = ivl_wire_put_policy(sdk.incoming.bytes, &packet);
     run_task(2);
     TEST_ASSERT_EQUAL_INT(1, sdk.n_sent);
-    TEST_ASSERT_EQUAL_UINT32(8, ivl_app.state.policy.seq);
+    TEST_ASSERT_EQUAL_UINT32(8, ivl_app.state.policy.id.seq);
 }
 
 // xorshift: the same bytes on every machine
@@ -829,7 +856,18 @@ static void test_noise_on_the_channel_starts_no_motor_and_breaks_nothing(void)
             bytes[0] = (uint8_t)(1u + dice);
             bytes[1] = (uint8_t)IVL_WIRE_VERSION;
             bytes[4] = ((bytes[4] & 1u) != 0u) ? (uint8_t)IVL_REQUEST_ABORT : (uint8_t)(4u + bytes[4] % 250u);
-            handle(bytes, (dice == 0u) ? 14u : 25u);
+            // every second policy has its form and a right checksum, so that its numbers are looked at
+            if ((dice == 0u) && ((bytes[6] & 1u) != 0u))
+            {
+                ivl_wire_policy_t packet;
+                bytes[10] = 0u;
+                bytes[11] = 2u;
+                bytes[12] = 0u;
+                TEST_ASSERT_TRUE(ivl_wire_get_policy(bytes, 29, &packet));
+                packet.crc = constant_policy(0, packet.theta0, packet.theta1).id.crc;
+                (void)ivl_wire_put_policy(bytes, &packet);
+            }
+            handle(bytes, (dice == 0u) ? 29u : 25u);
             TEST_ASSERT_EQUAL_INT(1, sdk.n_sent);
         }
         else
@@ -838,7 +876,7 @@ static void test_noise_on_the_channel_starts_no_motor_and_breaks_nothing(void)
         }
         TEST_ASSERT_FALSE(ivl_app.out.motors_on);
         TEST_ASSERT_TRUE(!ivl_app.state.has_policy ||
-                         ((ivl_app.state.policy.rrev_c_per_s >= 0.0f) && (ivl_app.state.policy.moment_y_Nm <= 0.02f)));
+                         ((ivl_app.state.policy.theta[0] >= 0.0f) && (ivl_app.state.policy.theta[1] <= 0.02f)));
     }
     TEST_ASSERT_TRUE(ivl_app.n_bad_packet > 9000u);
 }
@@ -900,6 +938,7 @@ int main(void)
     RUN_TEST(test_motors_driven_past_the_controller_refuse_to_arm);
     RUN_TEST(test_nothing_arms_before_a_configuration_is_in_force);
     RUN_TEST(test_policy_is_echoed_as_it_is_in_force);
+    RUN_TEST(test_policy_with_a_wrong_checksum_or_form_is_refused);
     RUN_TEST(test_policy_after_the_trigger_is_refused);
     RUN_TEST(test_packets_are_answered_and_not_kept_when_another_controller_is_selected);
     RUN_TEST(test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat);

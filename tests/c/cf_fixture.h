@@ -4,7 +4,7 @@
 #ifndef CF_FIXTURE_H
 #define CF_FIXTURE_H
 #include "cf.h"
-#include "ivl_wire.h"
+#include "policy_fixture.h"
 #include "sim_fixture.h"
 
 static ivl_cf_t *vehicle;
@@ -135,9 +135,9 @@ static inline ivl_wire_config_echo_t commit_config(uint32_t seq)
     return echo;
 }
 
-static inline ivl_wire_policy_echo_t send_policy(uint32_t seq, float rrev_c_per_s, float moment_y_Nm)
+static inline ivl_wire_policy_echo_t send_policy(uint32_t seq, float rrev_c_per_s, float moment_Nm)
 {
-    const ivl_wire_policy_t packet = {seq, rrev_c_per_s, moment_y_Nm};
+    const ivl_wire_policy_t packet = constant_packet(seq, rrev_c_per_s, moment_Nm);
     ivl_wire_policy_echo_t  echo = {0};
     uint8_t                 bytes[IVL_WIRE_SIZE_MAX];
     TEST_ASSERT_TRUE(ivl_cf_app_receive(vehicle, bytes, ivl_wire_put_policy(bytes, &packet)));

@@ -152,7 +152,7 @@ static void send_any_packet(void)
         (void)ivl_cf_app_receive(vehicle, bytes, dice(sizeof bytes));
         return;
     }
-    const ivl_wire_policy_t  policy = {dice(1000), number() + 3.0f, (number() + 3.0f) * 3.0e-3f};
+    const ivl_wire_policy_t  policy = constant_packet(dice(1000), number() + 3.0f, (number() + 3.0f) * 3.0e-3f);
     const ivl_wire_command_t command = {(uint16_t)dice(65536), (uint8_t)dice(5), number(), number(), number(), number() + 2.0f, number()};
     const size_t             size = (dice(3) == 0) ? ivl_wire_put_policy(bytes, &policy) : ivl_wire_put_command(bytes, &command);
     (void)ivl_cf_app_receive(vehicle, bytes, size);

@@ -62,8 +62,7 @@ static ivl_sim_spec_t draw_spec(draws_t *draws, ivl_sim_start_t start)
     return (ivl_sim_spec_t){
         .speed_mps = {draw(draws, 0.5, 4.0)},
         .angle_deg = {draw(draws, 20.0, 90.0)},
-        .rrev_c_per_s = {draw(draws, 2.0, 7.0)},
-        .moment_y_Nmm = {draw(draws, 3.0, 11.0)},
+        .theta = {draw(draws, 2.0, 7.0), 1.0e-3 * draw(draws, 3.0, 11.0)},
         .d_ceil_m = {draw(draws, 0.1, 1.0)},
         .seed = {draw_u64(draws)},
         .stream = {draw_u64(draws)},
@@ -71,14 +70,13 @@ static ivl_sim_spec_t draw_spec(draws_t *draws, ivl_sim_start_t start)
     };
 }
 
-static ivl_sim_spec_t spec_of(double speed_mps, double angle_deg, double rrev_c_per_s, double moment_y_Nmm, double d_ceil_m, uint64_t seed,
+static ivl_sim_spec_t spec_of(double speed_mps, double angle_deg, double rrev_c_per_s, double moment_Nmm, double d_ceil_m, uint64_t seed,
                               uint64_t stream, ivl_sim_start_t start)
 {
     return (ivl_sim_spec_t){
         .speed_mps = {speed_mps},
         .angle_deg = {angle_deg},
-        .rrev_c_per_s = {rrev_c_per_s},
-        .moment_y_Nmm = {moment_y_Nmm},
+        .theta = {rrev_c_per_s, 1.0e-3 * moment_Nmm},
         .d_ceil_m = {d_ceil_m},
         .seed = {seed},
         .stream = {stream},
@@ -118,7 +116,7 @@ static void wait_for_end(const ivl_sim_spec_t *spec)
 static ivl_sim_outcome_t fly(const ivl_sim_spec_t *spec, uint32_t seq)
 {
     write_u8("sil", "reset", 1);
-    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, send_policy(seq, (float)spec->rrev_c_per_s[0], (float)(spec->moment_y_Nmm[0] * 1.0e-3)).status);
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, send_policy(seq, (float)spec->theta[0], (float)spec->theta[1]).status);
     TEST_ASSERT_EQUAL_UINT8(IVL_PHASE_READY, send_command(IVL_REQUEST_HOVER, 0.0f, 0.0f, hover_z_m, 0.0f, 0.0f).phase);
     write_spec(spec);
     const double before = read_log("sil", "episode");
@@ -186,7 +184,7 @@ static void test_speed_and_angle_come_from_the_command_unless_a_parameter_tells_
     other.speed_mps[0] = 3.0;
     other.angle_deg[0] = 10.0;
     write_u8("sil", "reset", 1);
-    (void)send_policy(2, (float)spec.rrev_c_per_s[0], (float)(spec.moment_y_Nmm[0] * 1.0e-3));
+    (void)send_policy(2, (float)spec.theta[0], (float)spec.theta[1]);
     (void)send_command(IVL_REQUEST_HOVER, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f);
     write_spec(&other);
     (void)send_command(IVL_REQUEST_APPROACH, 0.0f, 0.0f, 1.0f, 2.2f, angle_rad);

@@ -206,7 +206,7 @@ static void next_input(flight_t *f)
     if (rng_below(&f->rng, 100) == 0u)
     {
         const float        moment = rng_float(&f->rng, -0.001f, 0.022f);
-        const ivl_policy_t policy = {.seq = 1, .rrev_c_per_s = rng_float(&f->rng, -1.0f, 8.0f), .moment_y_Nm = moment};
+        const ivl_policy_t policy = constant_policy(1, rng_float(&f->rng, -1.0f, 8.0f), moment);
         (void)ivl_policy_commit(&f->fix.cfg, &f->fix.state, &policy);
     }
 }
@@ -247,7 +247,7 @@ static void check_trigger(flight_t *f, uint32_t n_trigger_before, bool is_pose_g
         TEST_ASSERT_EQUAL_UINT32(n_trigger_before + 1u, state->diag.n_trigger);
         TEST_ASSERT_TRUE(is_pose_good && approach_is_good(&f->fix.in.cmd, &f->fix.cfg));
         TEST_ASSERT_TRUE(vitals_are_good(&f->fix.in.vitals, &f->fix.cfg));
-        TEST_ASSERT_TRUE(state->snapshot.rrev_per_s >= state->snapshot.policy.rrev_c_per_s);
+        TEST_ASSERT_TRUE(state->snapshot.rrev_per_s >= state->policy.theta[0]);
         TEST_ASSERT_TRUE((state->snapshot.rrev_per_s > 0.0f) && (state->snapshot.d_ceil_m > 0.0f));
         TEST_ASSERT_TRUE(state->snapshot.d_sigma_m >= 0.0f);
         TEST_ASSERT_TRUE(state->snapshot.d_sigma_m <= f->fix.cfg.d_sigma_norm_max * state->snapshot.d_ceil_m);

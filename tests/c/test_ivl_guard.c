@@ -467,7 +467,7 @@ static void test_flip_ignores_every_fault_that_is_not_its_own(void)
     fix_ticks(&fix, 0.2f);
     assert_phase(IVL_PHASE_FLIP, &fix);
     TEST_ASSERT_TRUE(fix.out.motors_on);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, -0.008f, fix.out.moment_y_Nm);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, -0.008f, fix.out.pitch_moment_Nm);
 }
 
 // ---- after an abort

@@ -3,11 +3,11 @@
 
 #include "test_ivl_support.h"
 
-static void thrusts_of(float moment_y_Nm, float thrust_N[4])
+static void thrusts_of(float moment_Nm, float thrust_N[4])
 {
     ivl_cfg_t cfg;
     ivl_cfg_defaults(&cfg);
-    ivl_maneuver_thrusts(&cfg, moment_y_Nm, thrust_N);
+    ivl_maneuver_thrusts(&cfg, moment_Nm, thrust_N);
 }
 
 static void test_front_pair_shares_the_moment_and_the_rear_pair_is_off(void)
@@ -28,11 +28,11 @@ static void test_moment_made_is_nose_up_and_of_the_size_asked_for(void)
     rng_t rng = {4};
     for (int i = 0; i < 10000; i++)
     {
-        const float moment_y_Nm = rng_float(&rng, 0.0f, 0.0106f);
+        const float moment_Nm = rng_float(&rng, 0.0f, 0.0106f);
         float       f[4];
-        ivl_maneuver_thrusts(&cfg, moment_y_Nm, f);
+        ivl_maneuver_thrusts(&cfg, moment_Nm, f);
         const ivl_wrench_t made = ivl_mixer_wrench(&cfg, f);
-        TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, -moment_y_Nm, made.moment_B_Nm.y);
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, -moment_Nm, made.moment_B_Nm.y);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-9f, 0.0f, made.moment_B_Nm.x);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-9f, 0.0f, made.moment_B_Nm.z);
     }

@@ -89,7 +89,7 @@ static void test_approach_triggers_in_the_first_tick_when_the_threshold_is_zero(
     fix_request(&fix, IVL_REQUEST_APPROACH);
     assert_phase(IVL_PHASE_FLIP, &fix);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 1.1f, fix.state.snapshot.d_ceil_m);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, -0.008f, fix.out.moment_y_Nm);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, -0.008f, fix.out.pitch_moment_Nm);
 }
 
 static void test_approach_waits_in_ready_for_the_policy_and_the_minimum_stay(void)

@@ -1,9 +1,9 @@
 /// @file test_ivl_policy.c
 #include "test_ivl_support.h"
 
-static ivl_status_t commit(fix_t *fix, uint32_t seq, float rrev_c_per_s, float moment_y_Nm)
+static ivl_status_t commit(fix_t *fix, uint32_t seq, float rrev_c_per_s, float moment_Nm)
 {
-    const ivl_policy_t policy = {.seq = seq, .rrev_c_per_s = rrev_c_per_s, .moment_y_Nm = moment_y_Nm};
+    const ivl_policy_t policy = constant_policy(seq, rrev_c_per_s, moment_Nm);
     return ivl_policy_commit(&fix->cfg, &fix->state, &policy);
 }
 
@@ -14,9 +14,8 @@ static void test_policy_is_in_force_as_a_whole_when_good(void)
     TEST_ASSERT_FALSE(fix.state.has_policy);
     TEST_ASSERT_EQUAL_INT(IVL_OK, commit(&fix, 3, 4.5f, 0.008f));
     TEST_ASSERT_TRUE(fix.state.has_policy);
-    TEST_ASSERT_EQUAL_UINT32(3, fix.state.policy.seq);
-    TEST_ASSERT_EQUAL_FLOAT(4.5f, fix.state.policy.rrev_c_per_s);
-    TEST_ASSERT_EQUAL_FLOAT(0.008f, fix.state.policy.moment_y_Nm);
+    const ivl_policy_t wanted = constant_policy(3, 4.5f, 0.008f);
+    TEST_ASSERT_EQUAL_MEMORY(&wanted, &fix.state.policy, sizeof wanted);
     TEST_ASSERT_EQUAL_UINT32(0, fix.state.diag.n_policy_refused);
 }
 
@@ -45,6 +44,72 @@ static void test_ends_of_the_ranges_are_accepted(void)
     TEST_ASSERT_EQUAL_INT(IVL_OK, commit(&fix, 2, 20.0f, 0.02f));
 }
 
+static void test_a_form_that_does_not_exist_or_has_another_length_is_refused(void)
+{
+    fix_t fix;
+    fix_init(&fix);
+    for (uint32_t form = 0; form < 256u; form++)
+    {
+        for (uint32_t n = 0; n < 256u; n++)
+        {
+            ivl_policy_t policy = constant_policy(1, 4.5f, 0.008f);
+            policy.id.form = (uint8_t)form;
+            policy.n = (uint8_t)n;
+            if ((ivl_form(form) == NULL) || (n != ivl_form(form)->n_params))
+            {
+                TEST_ASSERT_EQUAL_INT(IVL_ERR_FORM, ivl_policy_commit(&fix.cfg, &fix.state, &policy));
+                TEST_ASSERT_EQUAL_UINT32(0, ivl_policy_crc(&policy));
+            }
+        }
+    }
+    TEST_ASSERT_FALSE(fix.state.has_policy);
+}
+
+static void test_a_moment_beyond_what_the_configuration_allows_is_refused(void)
+{
+    fix_t fix;
+    fix_init(&fix);
+    fix.cfg.flip_moment_Nm_max = 0.005f;
+    ivl_init(&fix.cfg, &fix.state);
+    TEST_ASSERT_EQUAL_INT(IVL_ERR_RANGE, commit(&fix, 1, 4.5f, 0.0051f));
+    TEST_ASSERT_EQUAL_INT(IVL_OK, commit(&fix, 1, 4.5f, 0.005f));
+}
+
+/// Whatever the numbers of a form are within its ranges, its moment is none that it did not announce.
+static void test_a_form_asks_for_no_more_moment_than_it_says(void)
+{
+    rng_t rng = {5};
+    for (uint32_t number = 0; ivl_form(number) != NULL; number++)
+    {
+        const ivl_form_t *form = ivl_form(number);
+        TEST_ASSERT_TRUE((form->n_params > 0u) && (form->n_params <= IVL_FORM_PARAMS_MAX));
+        for (int k = 0; k < 2000; k++)
+        {
+            ivl_policy_t policy = {.id = {.form = (uint8_t)number}, .n = form->n_params};
+            for (uint32_t i = 0; i < policy.n; i++)
+            {
+                policy.theta[i] = rng_float(&rng, form->params[i].lo, form->params[i].hi);
+            }
+            const ivl_seen_t seen = {.ceiling = {.d_ceil_m = rng_float(&rng, 0.01f, 3.0f), .valid = true},
+                                     .cues = {rng_float(&rng, -5.0f, 25.0f), rng_float(&rng, -20.0f, 20.0f), true}};
+            const ivl_action_t action = ivl_policy_decide(&policy, &seen);
+            TEST_ASSERT_TRUE(action.moment_Nm >= 0.0f && action.moment_Nm <= form->moment_most_Nm(policy.theta));
+            TEST_ASSERT_FALSE(action.flip && !action.go);
+            TEST_ASSERT_FALSE(action.flip && !(seen.cues.rrev_per_s > 0.0f));
+        }
+    }
+}
+
+static void test_checksum_tells_policies_apart(void)
+{
+    const ivl_policy_t policy = constant_policy(1, 4.5f, 0.008f), same = constant_policy(2, 4.5f, 0.008f);
+    TEST_ASSERT_EQUAL_HEX32(policy.id.crc, same.id.crc);
+    // "constant", then 4.5 and 0.008 as little-endian floats: zlib.crc32 in Python says the same
+    TEST_ASSERT_EQUAL_HEX32(0x43BB9AD1u, policy.id.crc);
+    TEST_ASSERT_NOT_EQUAL(policy.id.crc, constant_policy(1, nextafterf(4.5f, 5.0f), 0.008f).id.crc);
+    TEST_ASSERT_NOT_EQUAL(policy.id.crc, constant_policy(1, 4.5f, nextafterf(0.008f, 1.0f)).id.crc);
+}
+
 static void test_policy_can_change_until_the_trigger_and_again_in_idle(void)
 {
     const ivl_phase_t open[] = {IVL_PHASE_IDLE, IVL_PHASE_READY, IVL_PHASE_APPROACH, IVL_PHASE_ABORTED};
@@ -56,7 +121,7 @@ static void test_policy_can_change_until_the_trigger_and_again_in_idle(void)
         TEST_ASSERT_EQUAL_INT(IVL_OK, commit(&fix, 9, 5.0f, 0.007f));
         fix_to_phase(&fix, shut[i]);
         TEST_ASSERT_EQUAL_INT(IVL_ERR_PHASE, commit(&fix, 9, 5.0f, 0.007f));
-        TEST_ASSERT_EQUAL_UINT32(7, fix.state.policy.seq);
+        TEST_ASSERT_EQUAL_UINT32(7, fix.state.policy.id.seq);
         TEST_ASSERT_EQUAL_UINT32(1, fix.state.diag.n_policy_refused);
         fix_request(&fix, IVL_REQUEST_IDLE);
         TEST_ASSERT_EQUAL_INT(IVL_OK, commit(&fix, 9, 5.0f, 0.007f));
@@ -69,6 +134,10 @@ int main(void)
     RUN_TEST(test_policy_is_in_force_as_a_whole_when_good);
     RUN_TEST(test_policy_is_refused_as_a_whole_and_counted_when_bad);
     RUN_TEST(test_ends_of_the_ranges_are_accepted);
+    RUN_TEST(test_a_form_that_does_not_exist_or_has_another_length_is_refused);
+    RUN_TEST(test_a_moment_beyond_what_the_configuration_allows_is_refused);
+    RUN_TEST(test_a_form_asks_for_no_more_moment_than_it_says);
+    RUN_TEST(test_checksum_tells_policies_apart);
     RUN_TEST(test_policy_can_change_until_the_trigger_and_again_in_idle);
     return UNITY_END();
 }

@@ -213,7 +213,7 @@ static void test_landing_goes_through_its_phases_once(void)
     TEST_ASSERT_EQUAL_MEMORY(&fix.in.v_WB_mps, &snapshot.v_WB_mps, sizeof snapshot.v_WB_mps);
     TEST_ASSERT_EQUAL_FLOAT(2.7f - snapshot.p_WB_m.z, snapshot.d_ceil_m);
     TEST_ASSERT_EQUAL_UINT32(7, snapshot.policy.seq);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, -0.008f, fix.out.moment_y_Nm);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, -0.008f, fix.out.pitch_moment_Nm);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, fix.out.thrust_N[1] + fix.out.thrust_N[2]);
 
     // Then the body turns nose up, and the motors are cut once it is past the horizontal

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "ivl.h"
+#include "policy_fixture.h"
 #include "unity.h"
 
 // ---- random numbers: splitmix64, same sequence on every machine
@@ -85,9 +86,9 @@ static inline void fix_init(fix_t *fix)
     fix->in = good_input();
 }
 
-static inline void fix_policy(fix_t *fix, float rrev_c_per_s, float moment_y_Nm)
+static inline void fix_policy(fix_t *fix, float rrev_c_per_s, float moment_Nm)
 {
-    const ivl_policy_t policy = {.seq = 7, .rrev_c_per_s = rrev_c_per_s, .moment_y_Nm = moment_y_Nm};
+    const ivl_policy_t policy = constant_policy(7, rrev_c_per_s, moment_Nm);
     TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix->cfg, &fix->state, &policy));
 }
 

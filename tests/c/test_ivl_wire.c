@@ -7,8 +7,10 @@ static uint8_t bytes[IVL_WIRE_SIZE_MAX];
 
 static void test_policy_has_the_documented_bytes(void)
 {
-    const ivl_wire_policy_t packet = {.seq = 0x04030201u, .rrev_c_per_s = 1.0f, .moment_y_Nm = -2.0f};
-    const uint8_t           expected[] = {0x01, 0x01, 0x01, 0x02, 0x03, 0x04, 0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x00, 0xc0};
+    const ivl_wire_policy_t packet = {
+        .seq = 0x04030201u, .crc = 0x08070605u, .form = 9u, .n = 3u, .part = 0u, .theta0 = 1.0f, .theta1 = -2.0f, .theta2 = 0.5f};
+    const uint8_t expected[] = {0x01, 0x02, 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x08, 0x09, 0x03, 0x00, 0x00, 0x00,
+                                0x80, 0x3f, 0x00, 0x00, 0x00, 0xc0, 0x00, 0x00, 0x00, 0x3f, 0x00, 0x00, 0x00, 0x00};
     TEST_ASSERT_EQUAL_UINT64(sizeof expected, ivl_wire_put_policy(bytes, &packet));
     TEST_ASSERT_EQUAL_MEMORY(expected, bytes, sizeof expected);
 }
@@ -17,14 +19,14 @@ static void test_command_has_the_documented_bytes(void)
 {
     const ivl_wire_command_t packet = {.seq = 0x1234u, .request = 2u, .hover_x_m = 1.0f, .hover_z_m = -2.0f, .angle_rad = 1.0f};
     TEST_ASSERT_EQUAL_UINT64(25, ivl_wire_put_command(bytes, &packet));
-    const uint8_t head[] = {0x02, 0x01, 0x34, 0x12, 0x02, 0x00, 0x00, 0x80, 0x3f};
+    const uint8_t head[] = {0x02, 0x02, 0x34, 0x12, 0x02, 0x00, 0x00, 0x80, 0x3f};
     TEST_ASSERT_EQUAL_MEMORY(head, bytes, sizeof head);
 }
 
 static void test_reading_has_the_documented_bytes(void)
 {
     const ivl_wire_reading_t packet = {.valid = 3u, .age_s = 0.5f, .rrev_per_s = 1.0f, .of_y_radps = -2.0f};
-    const uint8_t            expected[] = {0x03, 0x01, 0x03, 0x00, 0x00, 0x00, 0x3f, 0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x00, 0xc0};
+    const uint8_t            expected[] = {0x03, 0x02, 0x03, 0x00, 0x00, 0x00, 0x3f, 0x00, 0x00, 0x80, 0x3f, 0x00, 0x00, 0x00, 0xc0};
     TEST_ASSERT_EQUAL_UINT64(sizeof expected, ivl_wire_put_reading(bytes, &packet));
     TEST_ASSERT_EQUAL_MEMORY(expected, bytes, sizeof expected);
 }
@@ -53,20 +55,20 @@ static void test_reading_has_the_documented_bytes(void)
 
 static void test_packets_survive_the_way_and_refuse_what_is_not_theirs(void)
 {
-    CHECK_ROUND_TRIP(policy, .seq = 7, .rrev_c_per_s = 4.8f, .moment_y_Nm = 0.008f);
+    CHECK_ROUND_TRIP(policy, .seq = 7, .crc = 0x12345678u, .form = 1, .n = 6, .part = 1, .theta0 = 4.8f, .theta3 = 0.008f);
     CHECK_ROUND_TRIP(command, .seq = 9, .request = 1, .hover_x_m = -1.5f, .hover_y_m = 2.0f, .hover_z_m = 1.0f, .speed_mps = 2.5f);
     CHECK_ROUND_TRIP(reading, .valid = 1, .age_s = 0.02f, .rrev_per_s = 4.8f, .of_y_radps = -1.5f);
-    CHECK_ROUND_TRIP(policy_echo, .seq = 7, .status = -2, .seq_in_force = 6, .rrev_c_per_s = 3.0f, .moment_y_Nm = 0.01f);
+    CHECK_ROUND_TRIP(policy_echo, .seq = 7, .status = -2, .missing = 0x8001u, .seq_in_force = 6, .crc_in_force = 0xdeadbeefu, .form_in_force = 2);
     CHECK_ROUND_TRIP(command_echo, .seq = 65535, .status = -1, .request = 3, .phase = 7, .rule = 11, .cause = 12);
     CHECK_ROUND_TRIP(config_echo, .seq = 1, .status = -3, .bad = 255, .crc = 0xdeadbeefu);
 }
 
 static void test_values_that_are_no_numbers_pass_through(void)
 {
-    const ivl_wire_policy_t sent = {.seq = 1, .rrev_c_per_s = NAN, .moment_y_Nm = -INFINITY};
+    const ivl_wire_policy_t sent = {.seq = 1, .theta0 = NAN, .theta3 = -INFINITY};
     ivl_wire_policy_t       got;
     TEST_ASSERT_TRUE(ivl_wire_get_policy(bytes, ivl_wire_put_policy(bytes, &sent), &got));
-    TEST_ASSERT_TRUE(isnan(got.rrev_c_per_s) && isinf(got.moment_y_Nm));
+    TEST_ASSERT_TRUE(isnan(got.theta0) && isinf(got.theta3));
 }
 
 static void test_crc_has_the_value_that_zip_files_have(void)
@@ -90,7 +92,7 @@ static void test_random_bytes_are_accepted_only_with_type_version_and_size(void)
             noise[k] = (uint8_t)rng_u64(&rng);
         }
         noise[0] = (uint8_t)(noise[0] & 0x83u);
-        noise[1] = (uint8_t)(noise[1] & 0x01u);
+        noise[1] = ((noise[1] & 1u) != 0u) ? (uint8_t)IVL_WIRE_VERSION : (uint8_t)(noise[1] >> 5u);
         ivl_wire_policy_t       policy;
         ivl_wire_command_t      command;
         ivl_wire_reading_t      reading;
@@ -101,7 +103,7 @@ static void test_random_bytes_are_accepted_only_with_type_version_and_size(void)
                       ivl_wire_get_reading(noise, size, &reading) + ivl_wire_get_policy_echo(noise, size, &policy_echo) +
                       ivl_wire_get_command_echo(noise, size, &command_echo) + ivl_wire_get_config_echo(noise, size, &config_echo);
         TEST_ASSERT_TRUE(n <= 1);
-        TEST_ASSERT_TRUE((n == 0) || ((noise[1] == 1u) && (size >= 9u)));
+        TEST_ASSERT_TRUE((n == 0) || ((noise[1] == IVL_WIRE_VERSION) && (size >= 9u)));
         n_accepted += (uint32_t)n;
     }
     TEST_ASSERT_TRUE(n_accepted > 1000u);

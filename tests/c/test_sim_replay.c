@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "policy_fixture.h"
 #include "sil.h"
 #include "sim_fixture.h"
 #include "sim_rollout.h"
@@ -108,8 +109,7 @@ static ivl_sim_outcome_t fly(const ivl_sim_model_t *model, ivl_sim_start_t start
 {
     const ivl_sim_spec_t spec = {.speed_mps = {2.5},
                                  .angle_deg = {75.0},
-                                 .rrev_c_per_s = {rrev_c_per_s},
-                                 .moment_y_Nmm = {8.0},
+                                 .theta = {rrev_c_per_s, 8.0e-3},
                                  .d_ceil_m = {0.5},
                                  .seed = {3},
                                  .start = {(int32_t)start}};
@@ -123,7 +123,7 @@ static ivl_sim_outcome_t fly(const ivl_sim_model_t *model, ivl_sim_start_t start
 
 static ivl_policy_t policy_of(double rrev_c_per_s)
 {
-    return (ivl_policy_t){.seq = 1, .rrev_c_per_s = (float)rrev_c_per_s, .moment_y_Nm = (float)(8.0 * 1.0e-3)};
+    return constant_policy(1, (float)rrev_c_per_s, 8.0e-3f);
 }
 
 static void assert_same_float(float wanted, float found)
@@ -140,7 +140,7 @@ static void assert_row(size_t i)
     assert_same_float(o->cues.of_y_radps, rows[i].of_y_radps);
     assert_same_float(o->thrust_N[0], rows[i].thrust1_N);
     assert_same_float(o->thrust_N[3], rows[i].thrust4_N);
-    assert_same_float(o->moment_y_Nm, rows[i].moment_y_Nm);
+    assert_same_float(o->pitch_moment_Nm, rows[i].pitch_moment_Nm);
     assert_same_float(s->snapshot.rrev_per_s, rows[i].trigger_rrev_per_s);
     TEST_ASSERT_EQUAL_UINT8(o->phase, rows[i].phase);
     TEST_ASSERT_EQUAL_UINT8(s->guard.rule, rows[i].rule);
@@ -243,7 +243,7 @@ static void test_a_policy_out_of_range_is_refused_before_the_first_tick(void)
     const float           bad[] = {-0.1f, 20.1f, (float)NAN, (float)INFINITY};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
     {
-        const ivl_policy_t policy = {.rrev_c_per_s = bad[i], .moment_y_Nm = 0.008f};
+        const ivl_policy_t policy = constant_policy(1, bad[i], 0.008f);
         assert_refused(&model.firmware, &policy, IVL_SIM_REPLAY_BAD_POLICY);
     }
 }

@@ -44,8 +44,7 @@ static ivl_sim_spec_t spec_of(double speed, double angle, double rrev_c, double 
 {
     return (ivl_sim_spec_t){.speed_mps = {speed},
                             .angle_deg = {angle},
-                            .rrev_c_per_s = {rrev_c},
-                            .moment_y_Nmm = {moment},
+                            .theta = {rrev_c, 1.0e-3 * moment},
                             .d_ceil_m = {0.5},
                             .seed = {1},
                             .start = {(int32_t)start}};
@@ -204,8 +203,7 @@ static void check_missed(const ivl_sim_model_t *model, const ivl_sim_spec_t *spe
     ivl_sim_world_start(&group, 0, &rng, p, v);
     ivl_sim_world_t *w = &group.world[0];
     w->in.cmd = (ivl_command_t){.request = IVL_REQUEST_APPROACH, .speed_mps = (float)V, .angle_rad = (float)angle};
-    const ivl_policy_t policy = {
-        .seq = 1, .rrev_c_per_s = (float)spec->rrev_c_per_s[0], .moment_y_Nm = (float)(spec->moment_y_Nmm[0] * 1.0e-3)};
+    const ivl_policy_t policy = ivl_sim_policy(spec->form[0], spec->theta, false);
     TEST_ASSERT_EQUAL(IVL_OK, ivl_policy_commit(&model->firmware, &w->firmware, &policy));
     while (w->t_s < o.t_trigger_s[0] + model->raw.end_missed_time_s)
     {
@@ -254,7 +252,7 @@ static void test_a_spec_that_is_no_number_or_out_of_range_is_refused_and_disturb
         for (int field = 0; field < 5; field++)
         {
             spec[n] = good;
-            double *const fields[] = {spec[n].speed_mps, spec[n].angle_deg, spec[n].rrev_c_per_s, spec[n].moment_y_Nmm, spec[n].d_ceil_m};
+            double *const fields[] = {spec[n].speed_mps, spec[n].angle_deg, &spec[n].theta[0], &spec[n].theta[1], spec[n].d_ceil_m};
             *fields[field] = bad[k];
             spec[n++].start[0] = IVL_SIM_START_AT_TRIGGER;
             spec[n++] = good;

@@ -1,6 +1,7 @@
 """What passes by, as frames of ivl.dbc: nothing is asked of the vehicle but the names of what its host logs."""
 
 import struct
+from dataclasses import dataclass
 
 from can import Message
 
@@ -27,7 +28,8 @@ class Observer:
     def __init__(self) -> None:
         """Nothing is known yet."""
         self.values: dict[str, float] = {}
-        self.policy: tuple[int, float, float] | None = None
+        self.policy: Policy | None = None
+        self._offered: dict[tuple[int, int], dict[int, list[float]]] = {}
         self.t_changed_s = float("-inf")
         self._names: dict[int, str] = {}
         self._blocks: dict[int, list[_Entry]] = {}
@@ -35,6 +37,8 @@ class Observer:
 
     def from_host(self, packet: bytes) -> list[bytes]:
         """Take a packet of the host; questions to the vehicle: the names of what is logged and was not seen yet."""
+        if split_header(packet[0]) == _APP:
+            self._part(packet[1:])
         if split_header(packet[0]) != _CONTROL or len(packet) < 2:
             return []
         command, block = packet[1], packet[2] if len(packet) > 2 else 0
@@ -91,7 +95,31 @@ class Observer:
     def _echo(self, payload: bytes) -> None:
         echo = packets.decode(payload)
         if echo is not None and echo.type == packets.PacketType.POLICY_ECHO:
-            self.policy = (int(echo["seq_in_force"]), echo["rrev_c_per_s"], echo["moment_y_Nm"])
+            key = (int(echo["seq_in_force"]), int(echo["crc_in_force"]))
+            parts = self._offered.get(key, {})
+            theta = [value for part in sorted(parts) for value in parts[part]]
+            self.policy = Policy(*key, int(echo["form_in_force"]), tuple(theta))
+            self._offered = {key: parts}
+
+    def _part(self, payload: bytes) -> None:
+        """The host's packets alone tell the parameters; the vehicle confirms them by their checksum."""
+        part = packets.decode(payload)
+        if part is not None and part.type == packets.PacketType.POLICY:
+            key = (int(part["seq"]), int(part["crc"]))
+            values = [value for name, value in part.values.items() if name.startswith("theta")]
+            n_left = int(part["n"]) - len(values) * int(part["part"])
+            self._offered.setdefault(key, {})[int(part["part"])] = values[: max(n_left, 0)]
+
+
+@dataclass(frozen=True)
+class Policy:
+    """The policy in force, as far as it is known."""
+
+    seq: int
+    crc: int
+    form: int
+    theta: tuple[float, ...]
+    """In SI; empty if the host was not heard when it sent them."""
 
 
 class Telemetry:
@@ -103,7 +131,7 @@ class Telemetry:
         self.n_refused = 0
         self._codec = codec
         self._count = 0
-        self._told: tuple[int, float, float] | None = None
+        self._told: Policy | None = None
 
     def frames(self, t_s: float, fresh_s: float = 1.0) -> list[Message]:
         """State frames if something was logged in the last `fresh_s`, and the policy if it is another one."""
@@ -115,9 +143,11 @@ class Telemetry:
                 frames.append(self._encode(name, {**values, "count": self._count}))
         if self.observer.policy is not None and self.observer.policy != self._told:
             self._told = self.observer.policy
-            seq, rrev_c_per_s, moment_y_Nm = self._told
-            frames.append(self._encode("POLICY_RREV", {"seq": seq, "rrev_c": rrev_c_per_s}))
-            frames.append(self._encode("POLICY_MOMENT", {"seq": seq, "moment": moment_y_Nm}))
+            frames.append(self._encode("POLICY", {"seq": self._told.seq, "crc": self._told.crc}))
+            frames += [
+                self._encode("POLICY_PARAM", {"form": self._told.form, "number": i, "value": value})
+                for i, value in enumerate(self._told.theta)
+            ]
         return [frame for frame in frames if frame is not None]
 
     def _encode(self, name: str, values: dict[str, float | None]) -> Message | None:

@@ -94,9 +94,11 @@ class CrazyflieSource:
     def _has_our_bits(self) -> bool:
         """Whether one landing there has the bits that it has here."""
         policy = self._experiment.policy
-        probe = Rollout(policy.rrev_c_per_s.mu0, policy.moment_y_Nmm.mu0)
-        spec = (self._experiment.speed_mps, self._experiment.angle_deg, probe.rrev_c_per_s, probe.moment_y_Nmm)
-        here = self.world.rollouts(*spec, seed=0, stream=0, start=self._experiment.start, threads=1)
+        probe = Rollout(tuple(policy.mu0))
+        here = self.world.rollouts(
+            self._experiment.speed_mps, self._experiment.angle_deg, *probe.theta, form=policy.form,
+            seed=0, stream=0, start=self._experiment.start, threads=1,
+        )  # fmt: skip
         there = self._fly_until_known(np.zeros(1, dtype=np.intp), probe)
         return there.outcomes.tobytes() == here.tobytes()
 
@@ -109,7 +111,7 @@ class CrazyflieSource:
             RolloutError: A rollout was discarded ten times, the vehicle stayed away, or the operator stopped.
         """
         for i in range(len(plan.theta)):
-            rollout = Rollout(float(plan.theta[i, 0]), float(plan.theta[i, 1]), int(plan.seed[i]), int(plan.stream[i]))
+            rollout = Rollout(tuple(plan.theta[i].tolist()), int(plan.seed[i]), int(plan.stream[i]))
             yield self._fly_until_known(np.array([i], dtype=np.intp), rollout)
 
     def close(self) -> None:
@@ -310,8 +312,7 @@ class CrazyflieSource:
             "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
             "seed": rollout.seed,
             "stream": rollout.stream,
-            "rrev_c_per_s": rollout.rrev_c_per_s,
-            "moment_y_Nmm": rollout.moment_y_Nmm,
+            **dict(zip(self._experiment.policy.shape.names, rollout.theta, strict=True)),
             "what": what,
         }
         if landing is not None:

@@ -33,10 +33,9 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Rollout:
-    """What is to be flown: policy (1/s, N mm) and the numbers that make a simulated landing repeatable."""
+    """What is to be flown: policy (in the units of its form) and the numbers that make a simulated landing repeatable."""
 
-    rrev_c_per_s: float
-    moment_y_Nmm: float
+    theta: tuple[float, ...]
     seed: int = 0
     stream: int = 0
 
@@ -97,7 +96,7 @@ class Episode:
         vehicle.begin_flight()
         start_W_m = field.to_start(rollout)
         battery_V = vehicle.battery_V
-        vehicle.offer_policy(rollout.rrev_c_per_s, rollout.moment_y_Nmm)
+        vehicle.offer_policy(self._experiment.policy.shape, rollout.theta)
         vehicle.ask_for(Command(Request.HOVER, start_W_m), (Phase.READY,), _READY_S)
         policy_seq = vehicle.confirm_policy()
         field.before_approach(rollout)

@@ -1,6 +1,6 @@
 """Packets of the app channel and the flight recorder, laid out by the library's own tables.
 
-data = encode(PacketType.POLICY, seq=7, rrev_c_per_s=4.8, moment_y_Nm=0.008)
+parts = encode_policy(7, forms.by_name("constant"), [4.8, 8.0])
 echo = decode(received)          # None if it is none of ours
 """
 
@@ -12,12 +12,13 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from ivl import native
+from ivl import forms, native
 from ivl.errors import LinkError
 
 RECORD_MAGIC = 0x524C5649
-RECORD_VERSION = 1
+RECORD_VERSION = 2
 RECORD_NO_ROW = 0xFFFF
 
 
@@ -39,6 +40,9 @@ class Status(IntEnum):
     RANGE = -1
     PHASE = -2
     NO_CONTROLLER = -3
+    FORM = -4
+    CRC = -5
+    INCOMPLETE = -6
 
 
 class Request(IntEnum):
@@ -68,6 +72,9 @@ STATUS_TEXT = {
     Status.RANGE: "out of range",
     Status.PHASE: "not in this phase",
     Status.NO_CONTROLLER: "another controller is selected",
+    Status.FORM: "its firmware does not have this form of policies",
+    Status.CRC: "what arrived does not have the checksum that was sent",
+    Status.INCOMPLETE: "parts of it did not arrive",
 }
 
 
@@ -105,6 +112,24 @@ def encode(kind: PacketType, **values: float) -> bytes:
     return head + record.tobytes()[len(head) :]
 
 
+def encode_policy(seq: int, form: forms.Form, theta: npt.ArrayLike) -> list[bytes]:
+    """The packets that bring a policy, in order: theta in the units of the form.
+
+    Raises:
+        ArgumentError: theta is not one of the form.
+    """
+    names = [name for name in _dtype(PacketType.POLICY).names or () if name.startswith("theta")]
+    values, crc = form.to_si(theta), form.crc(theta)
+    packets = []
+    for part, first in enumerate(range(0, form.n, len(names))):
+        own = values[first : first + len(names)].tolist() + [0.0] * len(names)
+        thetas = dict(zip(names, own, strict=False))
+        packets.append(
+            encode(PacketType.POLICY, seq=seq, crc=crc, form=form.number, n=form.n, part=part, **thetas)
+        )
+    return packets
+
+
 def encode_reading(rrev_per_s: float | None, of_y_radps: float | None = None, age_s: float = 0.0) -> bytes:
     """Bytes of READING: what a camera saw of the ceiling, `age_s` ago; None stands for what it did not see."""
     valid = (rrev_per_s is not None) + 2 * (of_y_radps is not None)
@@ -132,6 +157,7 @@ class Recording:
     Attributes:
         n_cycle: Arm cycle that it belongs to; changes with each recording.
         policy_seq: Number of the policy that triggered, 0 if none did.
+        policy_crc: Its checksum.
         trigger_row: Row of the trigger tick, None if the trigger did not fire.
         tick_hz: Rows per second.
         rows: Structured array in SI units, shape (n_rows,): t_s from the first row on, p_W_m (3), v_W_mps (3),
@@ -140,6 +166,7 @@ class Recording:
 
     n_cycle: int
     policy_seq: int
+    policy_crc: int
     trigger_row: int | None
     tick_hz: float
     rows: np.ndarray[Any, np.dtype[np.void]]
@@ -196,6 +223,7 @@ def record_rows(header: Mapping[str, int | float], data: bytes) -> Recording:
     return Recording(
         int(header["n_cycle"]),
         int(header["policy_seq"]),
+        int(header["policy_crc"]),
         None if trigger_row == RECORD_NO_ROW else trigger_row,
         float(header["tick_hz"]),
         rows,

@@ -159,15 +159,16 @@ def phase(vehicle: Vehicle) -> Check:
 
 def policy_range(vehicle: Vehicle, experiment: Experiment) -> Check:
     """The bounds of the search lie within what the vehicle will accept."""
-    record, _ = experiment.make_world().native_model.config()
-    limits = (float(record["ivl.rrev_c_max"][0]), 1e3 * float(record["ivl.moment_y_max"][0]))
-    bounds = (experiment.policy.rrev_c_per_s.bounds, experiment.policy.moment_y_Nmm.bounds)
     del vehicle
-    ok = all(lo >= 0.0 and hi <= limit for (lo, hi), limit in zip(bounds, limits, strict=True))
-    found = f"RREV_c {bounds[0][0]:g} .. {bounds[0][1]:g} 1/s, M_yd {bounds[1][0]:g} .. {bounds[1][1]:g} N mm"
+    model, policy = experiment.make_world().native_model, experiment.policy
+    corners = [[low for low, _ in policy.bounds], policy.mu0, [high for _, high in policy.bounds]]
+    ok = all(model.accepts(policy.shape.number, policy.shape.to_si(theta)) for theta in corners)
+    spans = zip(policy.shape.params, policy.bounds, strict=True)
+    most_Nmm = 1e3 * float(model.config()[0]["ivl.flip_moment_max"][0])
     return Check(
-        "policy bounds", ok, found, f"within 0 .. {limits[0]:g} 1/s and 0 .. {limits[1]:g} N mm",
-        "change policy.*.bounds of the experiment, or firmware.rrev_c_max and firmware.moment_y_max",
+        "policy bounds", ok, ", ".join(f"{p.name} {low:g} .. {high:g}" for p, (low, high) in spans),
+        f"accepted by the flight core; moments up to {most_Nmm:g} N mm",
+        "change policy.*.bounds of the experiment, or firmware.flip_moment_max",
     )  # fmt: skip
 
 

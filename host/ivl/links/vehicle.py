@@ -86,22 +86,36 @@ class Snapshot:
     vz_mps: float
 
 
-@dataclass(frozen=True)
 class Offer:
-    """A policy on its way, in the numbers of the packet."""
+    """A policy on its way."""
 
-    seq: int
-    rrev_c_per_s: float
-    moment_y_Nm: float
+    def __init__(self, seq: int, form: Form, theta: npt.ArrayLike) -> None:
+        """Number it; theta is in the units of the form.
 
-    @property
-    def data(self) -> bytes:
-        """The packet."""
-        return encode(PacketType.POLICY, seq=self.seq, rrev_c_per_s=self.rrev_c_per_s, moment_y_Nm=self.moment_y_Nm)
+        Raises:
+            ArgumentError: theta is not one of the form.
+        """
+        self.seq, self.form = seq, form.number
+        self.crc = form.crc(theta)
+        self._parts = encode_policy(seq, form, theta)
+        self._text = f"policy {form.describe(theta)}"
+        self._sent = False
+
+    def due(self, echo: Packet | None) -> list[bytes]:
+        """Packets to send now: all at first, then those that the vehicle says are missing.
+
+        While it says nothing, the last one alone is repeated: the vehicle answers to it.
+        """
+        if not self._sent or (echo is not None and echo["status"] == Status.CRC):
+            self._sent = True
+            return self._parts
+        if echo is None:
+            return self._parts[-1:]
+        return [part for i, part in enumerate(self._parts) if int(echo["missing"]) >> i & 1]
 
     def __str__(self) -> str:
         """As people know it."""
-        return f"policy RREV_c {self.rrev_c_per_s:g} 1/s, M_yd {1e3 * self.moment_y_Nm:g} N mm"
+        return self._text
 
 
 class Vehicle:
@@ -205,7 +219,10 @@ class Vehicle:
         )  # fmt: skip
         self.session.send(_PORT_PLATFORM, _APP, data)
         if self._offer is not None and self._policy_echo(self._offer) is None:
-            self.session.send(_PORT_PLATFORM, _APP, self._offer.data)
+            answer = self._echo.pop(PacketType.POLICY_ECHO, None)
+            own = answer if answer is not None and answer["seq"] == self._offer.seq else None
+            for part in self._offer.due(own):
+                self.session.send(_PORT_PLATFORM, _APP, part)
         return self._seq
 
     def tell_reading(self, rrev_per_s: float | None, of_y_radps: float | None = None, age_s: float = 0.0) -> None:
@@ -309,15 +326,23 @@ class Vehicle:
 
     # ---- policy
 
-    def put_policy(self, rrev_c_per_s: float, moment_y_Nmm: float) -> int:
+    def put_policy(self, form: Form, theta: npt.ArrayLike) -> int:
         """`offer_policy`, and then `confirm_policy`."""
-        self.offer_policy(rrev_c_per_s, moment_y_Nmm)
+        self.offer_policy(form, theta)
         return self.confirm_policy()
 
-    def offer_policy(self, rrev_c_per_s: float, moment_y_Nmm: float) -> None:
-        """From now on each command is followed by this policy, until the vehicle has confirmed it."""
+    def offer_policy(self, form: Form, theta: npt.ArrayLike) -> None:
+        """From now on each command is followed by this policy, until the vehicle has confirmed it.
+
+        Args:
+            form: Its form.
+            theta: Its parameters in the units of the form, shape (n,).
+
+        Raises:
+            ArgumentError: theta is not one of the form.
+        """
         self._policy_seq = self._policy_seq % 0xFFFF_FFFE + 1
-        self._offer = Offer(self._policy_seq, float(np.float32(rrev_c_per_s)), float(np.float32(moment_y_Nmm * 1e-3)))
+        self._offer = Offer(self._policy_seq, form, theta)
 
     def confirm_policy(self) -> int:
         """The number of the policy on offer, once the vehicle has said that this one is in force.
@@ -335,14 +360,17 @@ class Vehicle:
         status = Status(int(echo["status"])) if echo else Status.PHASE
         if status == Status.RANGE:
             raise PolicyRefused(f"{offer}: the vehicle refused it: {STATUS_TEXT[status]}")
-        found = (echo["seq_in_force"], echo["rrev_c_per_s"], echo["moment_y_Nm"]) if echo else ()
-        if status != Status.OK or found != (offer.seq, offer.rrev_c_per_s, offer.moment_y_Nm):
+        if status == Status.FORM:
+            raise LinkError(f"{offer}: the vehicle refused it: {STATUS_TEXT[status]}: flash the firmware of this host")
+        found = (echo["seq_in_force"], echo["crc_in_force"], echo["form_in_force"]) if echo else ()
+        if status != Status.OK or found != (offer.seq, offer.crc, offer.form):
             raise RolloutError(f"{offer}: not in force: {STATUS_TEXT[status]}, the vehicle has {found}")
         return offer.seq
 
     def _policy_echo(self, offer: "Offer") -> Packet | None:
         echo = self._echo.get(PacketType.POLICY_ECHO)
-        return echo if echo is not None and echo["seq"] == offer.seq else None
+        is_final = echo is not None and echo["seq"] == offer.seq and echo["status"] not in _ON_ITS_WAY
+        return echo if is_final else None
 
     # ---- supervisor and high-level commander
 

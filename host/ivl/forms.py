@@ -1,0 +1,127 @@
+"""Forms of policies: what the numbers of a theta mean, which the flight core's own table says.
+
+form = ivl.forms.by_name("constant")
+print(form.names, [p.unit for p in form.params])
+
+A theta is given in the units that people use (N mm, say); `Form.to_si` turns it into the numbers that travel.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from ivl import native
+from ivl.errors import ArgumentError
+
+PAPER = "constant"
+"""The paper's form, and the default everywhere."""
+_SI_DIGITS = 9  # of a float in single precision
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a form.
+
+    Attributes:
+        name: With its unit.
+        unit: That people use.
+        si: One unit in SI.
+        lo: Smallest value that a vehicle accepts, in `unit`.
+        hi: Largest value that a vehicle accepts, in `unit`.
+        doc: One line.
+    """
+
+    name: str
+    unit: str
+    si: float
+    lo: float
+    hi: float
+    doc: str
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of policies.
+
+    Attributes:
+        number: Row of the table of the flight core.
+        name: How files and commands call it.
+        doc: One line.
+        params: Its parameters, in the order of every theta.
+    """
+
+    number: int
+    name: str
+    doc: str
+    params: tuple[Parameter, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(p.name for p in self.params)
+
+    @property
+    def n(self) -> int:
+        """Number of parameters."""
+        return len(self.params)
+
+    def to_si(self, theta: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Numbers in SI units of a theta in the units of the parameters, shape (..., n) each.
+
+        Raises:
+            ArgumentError: The last axis has another length, or a value is out of its range.
+        """
+        values = np.asarray(theta, dtype=np.float64)
+        if values.shape[-1:] != (self.n,):
+            raise ArgumentError(
+                f"a policy of the form {self.name} has {self.n} parameters ({', '.join(self.names)}), "
+                f"not an array of shape {values.shape}"
+            )
+        for p, column in zip(self.params, np.moveaxis(values, -1, 0), strict=True):
+            good = (column >= p.lo) & (column <= p.hi)
+            if not good.all():
+                value = float(column[~good].flat[0])
+                raise ArgumentError(f"{p.name}: value {value!r} is out of range (allowed {p.lo:g} .. {p.hi:g} {p.unit})")
+        return values * np.array([p.si for p in self.params])
+
+    def crc(self, theta: npt.ArrayLike) -> int:
+        """Checksum by which a vehicle names this policy."""
+        return native.library().policy_crc(self.number, self.to_si(theta))
+
+    def describe(self, theta: npt.ArrayLike) -> str:
+        """A theta as people read it."""
+        values = np.asarray(theta, dtype=np.float64).tolist()
+        return ", ".join(f"{p.name} {value:.5g}" for p, value in zip(self.params, values, strict=True))
+
+
+@cache
+def forms() -> dict[str, Form]:
+    """All forms that this library has, by name."""
+    found = [
+        Form(number, name, doc, tuple(_parameter(field) for field in fields))
+        for number, (name, doc, fields) in enumerate(native.library().forms())
+    ]
+    return {form.name: form for form in found}
+
+
+def by_name(name: str) -> Form:
+    """A form by its name.
+
+    Raises:
+        ArgumentError: There is none with that name.
+    """
+    if name not in forms():
+        raise ArgumentError(f"policy form {name!r} is unknown (allowed {', '.join(forms())})")
+    return forms()[name]
+
+
+def _parameter(field: native.Field) -> Parameter:
+    si = _decimal(field.default if field.default is not None else 1.0)
+    return Parameter(field.name, field.unit, si, _decimal(field.lo) / si, _decimal(field.hi) / si, field.doc)
+
+
+def _decimal(value: float) -> float:
+    """The shortest decimal number that rounds to a float of the table, which is the one that its source says."""
+    return float(np.format_float_positional(np.float32(value), precision=_SI_DIGITS, unique=True))
