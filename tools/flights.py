@@ -145,7 +145,7 @@ def feet(flights: store.Flights) -> list[dict[str, Any]]:
     The trigger's jitter (4 ms) and the height (8 mm) are fitted for each flight, so that only what follows counts.
     """
     found, _ = compare.flips(flights)
-    chosen = [f for f in found if MOMENT_NMM[0] <= f.moment_y_Nmm <= MOMENT_NMM[1] and f.n_legs >= 1]
+    chosen = [f for f in found if MOMENT_NMM[0] <= f.moment_Nmm <= MOMENT_NMM[1] and f.n_legs >= 1]
     home = World(VEHICLE, GEAR, GEAR_SET).changed(**dict.fromkeys(motion.SCATTER, 0.0))
     tried = [{}, *_TRIED_FEET]
     rows = []
@@ -180,7 +180,7 @@ def measure(logs: list[Path], spin_downs: list[Path]) -> dict[str, Any]:
             draw(result)
     low, high = MOMENT_NMM
     before = {name: value for name, value in BEFORE.items() if name in FITTED}
-    fit = identify_from(usable, before, lambda _, flip: not low <= flip.moment_y_Nmm <= high)
+    fit = identify_from(usable, before, lambda _, flip: not low <= flip.moment_Nmm <= high)
     return {
         "sources": list(flights.manifest.source),
         "n_flights": len(flights),

@@ -40,10 +40,10 @@ def _table(head: str, rows: list[str]) -> str:
 def _head(d: dict[str, Any]) -> str:
     now, endings = d["compared"]["now"], d["endings"]
     rates = " and ".join(
-        f"{p['rate']:.2f} at ({p['rrev_c_per_s']:g}, {p['moment_y_Nmm']:g})" for p in now["policies"][:2]
+        f"{p['rate']:.2f} at ({p['threshold_per_s']:g}, {p['moment_Nmm']:g})" for p in now["policies"][:2]
     )
     window = now["windows"][0]
-    span, flown = window["simulated_rrev_c_per_s"], window["landed_rrev_c_per_s"]
+    span, flown = window["simulated_threshold_per_s"], window["landed_threshold_per_s"]
     return f"""# Agreement with real flights
 
 `tools/flights.py` writes this page; its figures are in docs/data/flights.json. The flights are those of the paper's authors
@@ -54,7 +54,7 @@ The logs are not part of this repository. `habas2021` stays the simulation of th
 
 **Result.** The simulated `crazyflie21` turns as the real vehicle did: {now["pitch_rms_deg"]:.1f} degrees rms over the first 200 ms
 of the flip ({d["compared"]["before"]["pitch_rms_deg"]:.0f} before these flights were known). No parameter was fitted to an outcome.
-Its landing rates are {rates}, where real vehicles landed; at {window["moment_y_Nmm"]:.2f} N mm half of the simulated landings
+Its landing rates are {rates}, where real vehicles landed; at {window["moment_Nmm"]:.2f} N mm half of the simulated landings
 succeed from RREV_c {span[0]:.2f} to {span[1]:.2f} 1/s, and real landings had {flown[0]:.2f} to {flown[1]:.2f}.
 
 ![Recorded and simulated flips](figures/flights.png)"""
@@ -123,7 +123,7 @@ def _outcome(d: dict[str, Any]) -> str:
         )
     flown = d["compared"]["now"]["two_leg_share"]["flown"]
     policies = [
-        f"| ({p['rrev_c_per_s']:g}, {p['moment_y_Nmm']:g}) | {told} | {p['rate']:.2f} | {b['rate']:.2f} | {h['rate']:.2f} |"
+        f"| ({p['threshold_per_s']:g}, {p['moment_Nmm']:g}) | {told} | {p['rate']:.2f} | {b['rate']:.2f} | {h['rate']:.2f} |"
         for p, b, h, told in zip(
             *(d["compared"][k]["policies"] for k in ("now", "before", "habas2021")),
             ("the learning run converged here", "4 of 4 flights landed", "93.75 %, published"),

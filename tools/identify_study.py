@@ -35,14 +35,14 @@ def record(folder: Path, source: CrazyflieSource, n_flights: int, seed: int) -> 
     rng = np.random.default_rng(seed)
     paths = []
     for i in range(n_flights):
-        rollout = Rollout(float(rng.uniform(3.7, 4.0)), float(rng.uniform(5.5, 8.0)), seed, i)
+        rollout = Rollout((float(rng.uniform(3.7, 4.0)), float(rng.uniform(5.5, 8.0))), seed, i)
         landing = source.fly_one(rollout)
         if landing.recording is None:
             raise RuntimeError("the vehicle has no flight recorder")
         path = folder / f"{seed}-{i}.csv"
         path.write_text(landing.recording.to_csv(), encoding="utf-8")
         legs = int(landing.outcome["n_legs"][0])
-        given = Given(rrev_c_per_s=rollout.rrev_c_per_s, moment_y_Nmm=rollout.moment_y_Nmm, outcomes=[legs])
+        given = Given(threshold_per_s=rollout.theta[0], moment_Nmm=rollout.theta[1], outcomes=[legs])
         paths.append((path, given))
     parts = [importer.run([path], "ivl", given) for path, given in paths]
     return Flights(parts[0].manifest, tuple(part[0] for part in parts))

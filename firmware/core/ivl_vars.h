@@ -143,6 +143,10 @@
     X(uint32_t, "ivl", "policy_seq", ivl_state_t, policy.id.seq, "1", "number of the policy in use")                     \
     X(uint32_t, "ivl", "policy_crc", ivl_state_t, policy.id.crc, "1", "its checksum")                                    \
     X(uint8_t, "ivl", "policy_form", ivl_state_t, policy.id.form, "1", "its form")                                       \
+    X(float, "ivl", "theta0", ivl_state_t, policy.theta[0], "SI", "its first parameter")                                 \
+    X(float, "ivl", "theta1", ivl_state_t, policy.theta[1], "SI", "its second parameter")                                \
+    X(float, "ivl", "theta2", ivl_state_t, policy.theta[2], "SI", "its third parameter, 0 if it has none")               \
+    X(float, "ivl", "theta3", ivl_state_t, policy.theta[3], "SI", "its fourth parameter, 0 if it has none")              \
     X(uint8_t, "ivl", "go", ivl_state_t, action.go, "1", "1 if the policy expects a flip from here to land")             \
     X(float, "ivl", "flip_moment", ivl_state_t, action.moment_Nm, "N m", "moment that the policy asks for")              \
     X(float, "ivl", "trg_d", ivl_state_t, snapshot.d_ceil_m, "m", "distance at the trigger")                             \

@@ -84,7 +84,8 @@ class Form:
             if not good.all():
                 value = float(column[~good].flat[0])
                 raise ArgumentError(f"{p.name}: value {value!r} is out of range (allowed {p.lo:g} .. {p.hi:g} {p.unit})")
-        return values * np.array([p.si for p in self.params])
+        si: npt.NDArray[np.float64] = np.array([p.si for p in self.params])
+        return values * si
 
     def crc(self, theta: npt.ArrayLike) -> int:
         """Checksum by which a vehicle names this policy."""

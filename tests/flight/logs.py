@@ -28,16 +28,16 @@ class Truth:
 
     Attributes:
         columns: Columns of the schema by name, all finite, at 100 Hz.
-        rrev_c_per_s: Policy that was flown.
-        moment_y_Nmm: Policy that was flown.
+        threshold_per_s: Policy that was flown.
+        moment_Nmm: Policy that was flown.
         speed_mps: Approach speed.
         angle_deg: Approach angle.
         h_plane_m: Height of the plane of the cues.
     """
 
     columns: Mapping[str, Array]
-    rrev_c_per_s: float = 4.8
-    moment_y_Nmm: float = 8.0
+    threshold_per_s: float = 4.8
+    moment_Nmm: float = 8.0
     speed_mps: float = 2.5
     angle_deg: float = 60.0
     h_plane_m: float = 3.0
@@ -154,7 +154,7 @@ def habas_rows(
         row |= {f"q{axis}_Raw": c[f"track_q_{axis}"] for axis in "xyzw"}
         rows.append(names | row)
     if summary:
-        policy = f"[{truth.rrev_c_per_s} {truth.moment_y_Nmm} 0.  ]"
+        policy = f"[{truth.threshold_per_s} {truth.moment_Nmm} 0.  ]"
         up, along = (f(math.radians(truth.angle_deg)) * truth.speed_mps for f in (math.sin, math.cos))
         asked = {
             "vx": along,
@@ -255,7 +255,7 @@ def variables(truth: Truth) -> dict[str, Array]:
     result |= {f"motor.m{i}": np.rint(65535 * c[f"pwm_{i}_norm"]) for i in "1234"}
     result |= {f"motor.m{i}_rpm": np.rint(c[f"rotor_{i}_radps"] * 60 / (2 * math.pi)) for i in "1234"}
     result |= {f"ivl.thrust{i}": c[f"thrust_{i}_N"] for i in "1234"}
-    result |= {"ivl.thrust_total": c["thrust_cmd_N"], "ivl.moment_y": c["moment_cmd_y_Nm"], "ivl.phase": c["phase"]}
+    result |= {"ivl.thrust_total": c["thrust_cmd_N"], "ivl.pitch_moment": c["moment_cmd_y_Nm"], "ivl.phase": c["phase"]}
     result |= {"ivl.d_ceil": c["d_ceil_m"], "ivl.rrev": c["rrev_per_s"], "ivl.of_y": c["of_y_radps"]}
     result |= {"pm.vbat": c["battery_V"], "pm.vbatMV": np.rint(1000 * c["battery_V"])}
     result |= {f"kalman.state{axis.upper()}": c[f"p_{axis}_m"] for axis in "xyz"}
@@ -267,7 +267,7 @@ def variables(truth: Truth) -> dict[str, Array]:
     result |= {f"rpm.m{i}": np.rint(c[f"rotor_{i}_radps"] * 60 / (2 * math.pi)) for i in "1234"}
     result |= {f"ivl.pwm{i}": np.rint(65535 * c[f"pwm_{i}_norm"]) for i in "1234"}
     n = np.ones(len(truth))
-    result |= {"ivl.rrev_c": truth.rrev_c_per_s * n, "ivl.moment_c": truth.moment_y_Nmm / 1000 * n}
+    result |= {"ivl.theta0": truth.threshold_per_s * n, "ivl.theta1": truth.moment_Nmm / 1000 * n}
     return result | {"ivl.n_trigger": 3 + c["triggered"], "ivl.policy_seq": 7 * n}
 
 

@@ -36,7 +36,7 @@ def landing(world: World, rrev: float, moment: float, stream: int = 0, period_s:
     kept = {name: data[::step] for name, data in columns.items()}
     first = int(np.argmax(rows.phase >= 3)) - 1 if trace.outcome.triggered else None
     h_plane = values["world.ceiling_height"] + values["world.sensed_gap_offset"]
-    info = {"label": f"made-{stream}", "rrev_c_per_s": rrev, "moment_y_Nmm": moment, "h_plane_m": h_plane,
+    info = {"label": f"made-{stream}", "threshold_per_s": rrev, "moment_Nmm": moment, "h_plane_m": h_plane,
             "speed_mps": 2.5, "angle_deg": 90.0, "n_legs": float(trace.outcome.n_legs), "judged_by": "simulator",
             "usable": True, **known}  # fmt: skip
     if first is not None:

@@ -41,7 +41,7 @@ def simulated(
     columns["moment_cmd_y_Nm"] = np.where(after.phase == FLIP, -1e-3 * MOMENT, 0.0)
     plane_m = of.native_model.config()[0]["ivl.h_ceil"][0]
     known = {
-        "label": f"{speed:g} m/s", "rrev_c_per_s": rrev_c, "moment_y_Nmm": MOMENT, "speed_mps": speed,
+        "label": f"{speed:g} m/s", "threshold_per_s": rrev_c, "moment_Nmm": MOMENT, "speed_mps": speed,
         "angle_deg": angle, "h_plane_m": float(plane_m), "judged_by": "simulator",
     }  # fmt: skip
     return make_flight(known | info, columns)

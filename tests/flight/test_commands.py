@@ -109,14 +109,14 @@ def test_what_the_log_does_not_say_can_be_given(truth: Truth, tmp_path: Path) ->
     ]
     imported(path, *options, "--outcome", "2", form="cfclient", out=tmp_path / "out")
     info = flights.read(tmp_path / "out")[0].info
-    names = ("rrev_c_per_s", "moment_y_Nmm", "speed_mps", "angle_deg", "h_plane_m", "h_surface_m", "n_legs")
+    names = ("threshold_per_s", "moment_Nmm", "speed_mps", "angle_deg", "h_plane_m", "h_surface_m", "n_legs")
     assert [info[name] for name in names] == [4.8, 8.0, 2.5, 60.0, 3.0, 3.03, 2.0]
     assert info["judged_by"] == "operator"
 
 
 def test_what_the_log_says_cannot_be_changed(refused: Refused, july: Path, tmp_path: Path) -> None:
     text = refused(july, form="habas2021", options=("--rrev", "4"))
-    assert text == "flight ep0-run0: rrev_c_per_s: 4 was given, but the log says 4.8"
+    assert text == "flight ep0-run0: threshold_per_s: 4 was given, but the log says 4.8"
     assert refused(july, form="habas2021", options=("--h-plane", "2.1")).endswith("2.1 was given, but the log says 3")
     imported(july, "--rrev", "4.8", "--h-plane", "3.0", form="habas2021", out=tmp_path / "fine")
 
@@ -195,7 +195,7 @@ def test_help_teaches_with_examples(words: list[str], capsys: pytest.CaptureFixt
 def run_folder(truth: Truth, tmp_path: Path) -> Path:
     """A run of two episodes whose recordings were kept."""
     settings = ["learner.name=ephe_robust", "n_rollouts=4", "budget=8", "check.n_fresh=10", "check.effort=0.05"]
-    settings += ["check.rrev_c_per_s={lo: 4.5, hi: 5.0, step: 0.1}", "check.moment_y_Nmm={lo: 7.0, hi: 9.0, step: 1.0}"]
+    settings += ["check.threshold_per_s={lo: 4.5, hi: 5.0, step: 0.1}", "check.moment_Nmm={lo: 7.0, hi: 9.0, step: 1.0}"]
     chosen = experiment.load("experiments/paper_vertical.yaml", settings)
     folder = tmp_path / "run"
     campaign.run(chosen, folder)
@@ -224,7 +224,7 @@ def test_run_folder(run_folder: Path, tmp_path: Path) -> None:
     for flight, stream in zip(found, (0, 2, 5), strict=True):
         i = int(np.flatnonzero(rows.stream == stream)[0])
         info = flight.info
-        assert (info["rrev_c_per_s"], info["moment_y_Nmm"]) == tuple(rows.theta[i])
+        assert (info["threshold_per_s"], info["moment_Nmm"]) == tuple(rows.theta[i])
         assert (info["n_legs"], info["reward"]) == (rows.outcomes.n_legs[i], rows.reward[i])
         assert (info["speed_mps"], info["angle_deg"], info["judged_by"]) == (2.5, 90.0, "simulator")
         assert info["usable"]

@@ -47,9 +47,9 @@ def test_windows_span_where_half_of_the_landings_succeed(flights: store.Flights)
     (window,) = result.windows
     assert len(window.flown) == len(flights)
     low, high = window.span() or (np.nan, np.nan)
-    inside = (window.rrev_c_per_s >= low) & (window.rrev_c_per_s <= high)
+    inside = (window.threshold_per_s >= low) & (window.threshold_per_s <= high)
     assert window.rate[inside].min() >= 0.3
-    assert window.rate[np.argmin(np.abs(window.rrev_c_per_s - 3.0))] == 0.0
+    assert window.rate[np.argmin(np.abs(window.threshold_per_s - 3.0))] == 0.0
     assert result.at_policies[0][2] > 0.5
 
 
@@ -83,7 +83,7 @@ def test_flights_that_cannot_be_compared_are_named(flights: store.Flights) -> No
         compare.compare(folder(broken), "crazyflie21", "wide_short", "table1", n=2)
 
 
-@pytest.mark.parametrize("change", [{"h_plane_m": 1.0}, {"moment_y_Nmm": 1e3}])
+@pytest.mark.parametrize("change", [{"h_plane_m": 1.0}, {"moment_Nmm": 1e3}])
 def test_a_flight_that_cannot_be_flown_is_left_out_and_named(flights: store.Flights, change: dict[str, float]) -> None:
     wrong = store.Flight({**flights[0].info, **change, "label": "wrong"}, flights[0].samples)
     result = compare.compare(folder(flights[3], wrong), "crazyflie21", "wide_short", "table1", n=2)

@@ -79,7 +79,7 @@ def test_habas2021(truth: Truth, tmp_path: Path) -> None:
     only(flight, known)
     info = flight.info
     assert (info["label"], info["source"], info["usable"], info["note"]) == ("ep0-run0", "july.csv", True, "")
-    assert (info["rrev_c_per_s"], info["moment_y_Nmm"], info["n_legs"]) == (4.8, 8.0, 4)
+    assert (info["threshold_per_s"], info["moment_Nmm"], info["n_legs"]) == (4.8, 8.0, 4)
     assert info["speed_mps"] == pytest.approx(2.5)
     assert info["angle_deg"] == pytest.approx(60.0)
     assert info["t_trigger_s"] == pytest.approx(truth.t_trigger_s)
@@ -91,12 +91,12 @@ def test_habas2021(truth: Truth, tmp_path: Path) -> None:
 def test_recording(truth: Truth, tmp_path: Path) -> None:
     path = tmp_path / "landing.csv"
     path.write_text(recording_text(truth))
-    (flight,) = read("ivl", path, rrev_c_per_s=4.8, moment_y_Nmm=8.0, speed_mps=2.5, outcomes=(3,), judged_by="me")
+    (flight,) = read("ivl", path, threshold_per_s=4.8, moment_Nmm=8.0, speed_mps=2.5, outcomes=(3,), judged_by="me")
     known = [*POSE, *FORCE, *THRUST, "d_ceil_m", "phase", "triggered"]
     agree(flight, truth, known, 1e-6)
     only(flight, known)
     info = flight.info
-    assert (info["rrev_c_per_s"], info["moment_y_Nmm"], info["speed_mps"]) == (4.8, 8.0, 2.5)
+    assert (info["threshold_per_s"], info["moment_Nmm"], info["speed_mps"]) == (4.8, 8.0, 2.5)
     assert (info["n_legs"], info["judged_by"], info["h_plane_m"]) == (3, "me", truth.h_plane_m)
     assert info["t_trigger_s"] == pytest.approx(truth.t_trigger_s)
 
@@ -133,8 +133,8 @@ BLOCKS = {
     "tracking": [*(f"locSrv.{axis}" for axis in "xyz"), *(f"locSrv.q{axis}" for axis in "xyzw")],
     "setpoint": [*(f"ctrltarget.{axis}" for axis in "xyz"), *(f"ctrltarget.v{axis}" for axis in "xyz")],
     "motors": [f"motor.m{i}{end}" for end in ("", "_rpm") for i in range(1, 5)],
-    "app": ["ivl.phase", "ivl.d_ceil", "ivl.rrev", "ivl.of_y", "ivl.rrev_c", "ivl.moment_c", "ivl.policy_seq"],
-    "thrusts": [*(f"ivl.thrust{i}" for i in range(1, 5)), "ivl.thrust_total", "ivl.moment_y", "pm.vbat"],
+    "app": ["ivl.phase", "ivl.d_ceil", "ivl.rrev", "ivl.of_y", "ivl.theta0", "ivl.theta1", "ivl.policy_seq"],
+    "thrusts": [*(f"ivl.thrust{i}" for i in range(1, 5)), "ivl.thrust_total", "ivl.pitch_moment", "pm.vbat"],
 }
 """Log blocks; the radio carries 26 bytes in each."""
 FIRMWARE = [
@@ -152,7 +152,7 @@ def test_cfclient_with_every_block_in_a_file_of_its_own(truth: Truth, tmp_path: 
     agree(flight, truth, FIRMWARE)
     only(flight, FIRMWARE)
     info = flight.info
-    assert (info["rrev_c_per_s"], info["moment_y_Nmm"]) == (4.8, pytest.approx(8.0))
+    assert (info["threshold_per_s"], info["moment_Nmm"]) == (4.8, pytest.approx(8.0))
     assert info["h_plane_m"] == truth.h_plane_m
     assert info["t_trigger_s"] == pytest.approx(truth.t_trigger_s)
     assert math.isnan(info["n_legs"])

@@ -109,8 +109,8 @@ def test_hover_flip_without_clock_flag_and_summary(truth: Truth, tmp_path: Path)
     assert len(flight) == len(truth), "the row before the first packet is no sample"
     assert flight["t_s"] == pytest.approx(truth["t_s"])
     assert flight.info["t_trigger_s"] == pytest.approx(0.01 * at)
-    assert flight.info["moment_y_Nmm"] == pytest.approx(6.0)
-    assert math.isnan(flight.info["rrev_c_per_s"])
+    assert flight.info["moment_Nmm"] == pytest.approx(6.0)
+    assert math.isnan(flight.info["threshold_per_s"])
     assert flight.info["speed_mps"] == 0.0
     assert math.isnan(flight.info["angle_deg"])
     assert math.isnan(flight.info["n_legs"])

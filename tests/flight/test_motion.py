@@ -110,7 +110,7 @@ def test_repeated_rows_are_no_measurements(world: World) -> None:
 
 @pytest.mark.parametrize(("change", "words"), [
     ({"t_trigger_s": float("nan")}, "it did not trigger"),
-    ({"moment_y_Nmm": float("nan")}, "moment_y_Nmm is not known"),
+    ({"moment_Nmm": float("nan")}, "moment_Nmm is not known"),
     ({"h_plane_m": float("nan")}, "h_plane_m is not known"),
 ])  # fmt: skip
 def test_flights_that_cannot_be_compared_say_why(world: World, change: dict[str, float], words: str) -> None:

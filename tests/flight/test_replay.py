@@ -249,7 +249,7 @@ def test_samples_that_repeat_the_one_before_are_told_apart(world: World, log: Fl
     for values in repeated.samples.values():
         values[trigger - 1] = values[trigger - 2] if values is not repeated.samples["t_s"] else values[trigger - 1]
     repeated.samples["triggered"][trigger : trigger + 1] = 0.0
-    late = changed(repeated, rrev_c_per_s=float(repeated["rrev_per_s"][trigger - 2]) - 1e-4)
+    late = changed(repeated, threshold_per_s=float(repeated["rrev_per_s"][trigger - 2]) - 1e-4)
     result = replay.replay([late], world)
     assert trigger_of(result)["offset_samples"] == -3
     assert trigger_of(result)["offset_new_samples"] == -2
@@ -262,13 +262,13 @@ def test_flight_that_never_triggers_agrees_when_neither_does(world: World) -> No
     assert result.summary["trigger"]["n_neither"] == 1
     assert result.summary["trigger"]["within_one_sample"] == 1.0
     assert result.summary["flights"][0]["ended_early_by"] == ""
-    eager = replay.replay([changed(never, rrev_c_per_s=2.0)], world)
+    eager = replay.replay([changed(never, threshold_per_s=2.0)], world)
     assert eager.summary["trigger"]["n_replayed_only"] == 1
     assert "0 flights triggered in the log alone, 1 in the replay alone." in eager.verdict()
 
 
 def test_trigger_is_not_judged_without_policy_or_without_a_log_of_it(world: World, log: Flight) -> None:
-    no_policy = replay.replay([changed(log, rrev_c_per_s=float("nan"))], world)
+    no_policy = replay.replay([changed(log, threshold_per_s=float("nan"))], world)
     assert no_policy.summary["trigger"]["n"] == 0
     assert no_policy.summary["rrev"]["within_0_003"] == 1.0
     assert "no policy in the log: the trigger is not compared" in no_policy.summary["flights"][0]["notes"]
@@ -314,9 +314,9 @@ def test_core_that_may_not_begin_names_its_rule(log: Flight) -> None:
 def test_policy_out_of_range_is_one_line(world: World, log: Flight) -> None:
     wanted = r"^flight 2\.5 m/s: RREV_c 25 1/s, M_yd 8 N mm: policy refused by the flight core \(allowed 0 \.\. 20 1/s, 0 \.\. 20 N mm\)$"  # noqa: E501
     with pytest.raises(ConfigError, match=wanted):
-        replay.replay([changed(log, rrev_c_per_s=25.0)], world)
+        replay.replay([changed(log, threshold_per_s=25.0)], world)
     with pytest.raises(ConfigError, match="policy refused"):
-        replay.replay([changed(log, moment_y_Nmm=float("inf"))], world)
+        replay.replay([changed(log, moment_Nmm=float("inf"))], world)
 
 
 def test_plane_out_of_range_is_one_line(world: World, log: Flight) -> None:
@@ -395,7 +395,7 @@ def test_command_prints_one_object_or_a_table(
 
 
 def test_command_refuses_in_one_line(tmp_path: Path, log: Flight, capsys: pytest.CaptureFixture[str]) -> None:
-    flights = folder(tmp_path / "flights", changed(log, rrev_c_per_s=25.0))
+    flights = folder(tmp_path / "flights", changed(log, threshold_per_s=25.0))
     for words, message in (
         ([flights], "policy refused by the flight core"),
         ([flights, "--uri", "radio://0"], "allowed pil://"),

@@ -28,7 +28,7 @@ from ivl.flight.store import Flight, Flights, Manifest, make_flight
 @pytest.fixture
 def flights(truth: Truth) -> Flights:
     first = make_flight(
-        {"label": "a", "source": "a.csv", "n_legs": 4, "judged_by": "me", "rrev_c_per_s": 4.8, "note": "x"},
+        {"label": "a", "source": "a.csv", "n_legs": 4, "judged_by": "me", "threshold_per_s": 4.8, "note": "x"},
         truth.columns,
     )
     second = make_flight({"label": "b", "usable": False}, {"t_s": [0.0, 0.5, 2.0], "p_z_m": [1.0, np.nan, 3.0]})

@@ -87,7 +87,7 @@ def test_recorder_is_read_whatever_the_landing_comes_to(
     server: SilProcess, vertical: Experiment, theta: tuple[float, float]
 ) -> None:
     with CrazyflieSource(server.uri, vertical, Options(keep_recordings=True)) as source:
-        landing = source.fly_one(Rollout(*theta, seed=5, stream=6))
+        landing = source.fly_one(Rollout(theta, seed=5, stream=6))
     rows = vertical.make_world().trace(2.5, 90.0, *theta, seed=5, stream=6, period_s=0.002).rows
     recording = landing.recording
     assert recording is not None

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from ivl import World
+from ivl import World, forms
 from ivl.links import sil
 from ivl.links.clock import LockStep
 from ivl.links.packets import Phase, Request
@@ -47,7 +47,7 @@ class Bench:
         return self.seen.values["ivl.d_ceil"] - self.d_m if self.seen.values["ivl.d_sigma"] > 0.0 else math.nan
 
     def hover(self, rrev_c_per_s: float) -> None:
-        self.vehicle.put_policy(rrev_c_per_s, 8.0)
+        self.vehicle.put_policy(forms.by_name("constant"), [rrev_c_per_s, 8.0])
         start = (0.0, 0.0, self.h_ceil_m - START_BELOW_M)
         self.vehicle.ask_for(Command(Request.HOVER, start), (Phase.READY,), 2.0)
         self.vehicle.pause(3.0)

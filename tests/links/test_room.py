@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ivl import experiment, native
+from ivl import experiment, forms, native
 from ivl.errors import ConfigError, LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import crazyflie, preflight, sil
@@ -24,7 +24,7 @@ from ivl.mocap import config as mocap_config
 from ivl.silproc import SilProcess
 from ivl.source import Plan
 
-GOOD = Rollout(4.8, 8.0)
+GOOD = Rollout((4.8, 8.0))
 
 
 class Script:
@@ -111,7 +111,7 @@ def test_landing_is_flown_from_the_floor_and_judged_as_the_simulator_does(
 
 
 def test_fall_is_seen_as_no_landing(source: CrazyflieSource) -> None:
-    outcome = source.fly_one(Rollout(2.0, 6.0)).outcome
+    outcome = source.fly_one(Rollout((2.0, 6.0))).outcome
     known = truth(vehicle_of(source))
     assert outcome["n_legs"][0] == known["n_legs"][0] == 0
     # the simulator ends a landing as soon as it can only be missed, the recorder sees the vehicle's whole rise
@@ -177,7 +177,7 @@ def test_vehicle_is_brought_down_and_disarmed_from_any_phase(source: CrazyflieSo
     vehicle, field = vehicle_of(source), source._field
     assert field is not None
     start_W_m = field.to_start(GOOD)
-    vehicle.put_policy(4.8, 8.0)
+    vehicle.put_policy(forms.by_name("constant"), [4.8, 8.0])
     vehicle.ask_for(Command(Request.HOVER, start_W_m), (Phase.READY,), 5.0)
     if phase != Phase.READY:
         vehicle.ask_for(Command(Request.APPROACH, start_W_m, 2.5, 1.57), (phase,), 5.0)

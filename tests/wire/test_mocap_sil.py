@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from ivl import cli
+from ivl import cli, forms
 from ivl.cli import mocap as mocap_cli
 from ivl.errors import RolloutError
 from ivl.links import sil
@@ -106,7 +106,7 @@ class Lab:
         self.wait(self.is_tracked, "cameras that have followed the reset")
         self.session.write({"sil.pose_source": 1})
         self.wait_for_poses()
-        self.vehicle.put_policy(4.8, 8.0)
+        self.vehicle.put_policy(forms.by_name("constant"), [4.8, 8.0])
         self.asked.clear()
         guard = self.mocap.guard = LossGuard(lambda: self.vehicle.phase, self.abort)
         self.vehicle.ask_for(Command(Request.HOVER, self.vehicle.position_W_m), (Phase.READY,), DEADLINE_S)

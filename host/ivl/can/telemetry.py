@@ -18,6 +18,8 @@ _STATE = {
 }
 """Frame -> its signals and the logs that they show."""
 
+_OFFERS_MAX = 4  # policies on their way that are remembered
+
 _Entry = tuple[int, str]
 """Number of a log variable, and how `struct` names its type."""
 
@@ -107,6 +109,8 @@ class Observer:
         if part is not None and part.type == packets.PacketType.POLICY:
             key = (int(part["seq"]), int(part["crc"]))
             values = [value for name, value in part.values.items() if name.startswith("theta")]
+            if key not in self._offered and len(self._offered) >= _OFFERS_MAX:
+                self._offered.pop(next(iter(self._offered)))
             n_left = int(part["n"]) - len(values) * int(part["part"])
             self._offered.setdefault(key, {})[int(part["part"])] = values[: max(n_left, 0)]
 

@@ -63,7 +63,7 @@ class Replayed:
     @property
     def judges_trigger(self) -> bool:
         """True if policy and trigger are in the log, and the flight has an approach."""
-        known = inputs.tells_trigger(self.flight) and np.isfinite(self.flight.info["rrev_c_per_s"])
+        known = inputs.tells_trigger(self.flight) and np.isfinite(self.flight.info["threshold_per_s"])
         return bool(known and self.ticks.begins < len(self.flight))
 
     def sample_of(self, t_s: float) -> int:

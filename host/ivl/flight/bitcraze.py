@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ivl import forms
 from ivl.flight import streams
 from ivl.flight.log import Given, frozen_from
 from ivl.flight.phases import plane, trigger
@@ -52,7 +53,7 @@ _GROUPS: tuple[Sequence[Rule], ...] = (
     [Rule("rrev_per_s", "ivl.rrev", nothing=0.0)],
     [Rule("of_y_radps", "ivl.of_y", nothing=0.0)],
     [Rule("thrust_cmd_N", "ivl.thrust_total")],
-    [Rule("moment_cmd_y_Nm", "ivl.moment_y")],
+    [Rule("moment_cmd_y_Nm", "ivl.pitch_moment")],
     rules("thrust", "1234", "N", "ivl.thrust{}"),
     rules("pwm", "1234", "norm", "motor.m{}", 1 / _PWM_MAX),
     rules("pwm", "1234", "norm", "ivl.pwm{}", 1 / _PWM_MAX),
@@ -62,7 +63,8 @@ _GROUPS: tuple[Sequence[Rule], ...] = (
     [Rule("battery_V", "pm.vbatMV", 1e-3)],
 )
 """What the firmware logs twice stands here in the order of preference."""
-_FACTS = ("ivl.rrev_c", "ivl.moment_c", "ivl.policy_seq", "ivl.n_trigger", "ivl.trg_seq")
+_POLICY = ("threshold_per_s", "moment_Nmm")
+_FACTS = ("ivl.theta0", "ivl.theta1", "ivl.policy_form", "ivl.policy_seq", "ivl.n_trigger", "ivl.trg_seq")
 """Variables of the app that are no samples, but tell what was flown."""
 FRAMES = (
     "World and body as the firmware has them: world z up, x taken to be along the approach; body x forward, y left, z "
@@ -173,10 +175,11 @@ def _flight(merged: Merged, rows: Any) -> Flight:
     if "p_z_m" in columns and "d_ceil_m" in columns:
         info["h_plane_m"] = plane(columns["p_z_m"] + columns["d_ceil_m"])
     at = len(t_s) - 1 if first is None else first
-    if "ivl.rrev_c" in facts:
-        info["rrev_c_per_s"] = float(facts["ivl.rrev_c"][at])
-    if "ivl.moment_c" in facts:
-        info["moment_y_Nmm"] = 1000 * float(facts["ivl.moment_c"][at])
+    paper = forms.by_name(forms.PAPER)
+    if float(facts.get("ivl.policy_form", np.zeros(len(t_s)))[at]) == paper.number:
+        for name, log, parameter in zip(_POLICY, ("ivl.theta0", "ivl.theta1"), paper.params, strict=True):
+            if log in facts:
+                info[name] = float(facts[log][at]) / parameter.si
     flight = make_flight(info, {"t_s": t_s - t_s[0], **columns})
     stop_s = frozen_from(flight)
     if stop_s is None:

@@ -70,25 +70,25 @@ class Window:
 
     Attributes:
         approach: Speed (m/s) and angle (degrees).
-        moment_y_Nmm: Moment, N mm.
-        rrev_c_per_s: Thresholds, shape (n,).
+        moment_Nmm: Moment, N mm.
+        threshold_per_s: Thresholds, shape (n,).
         rate: Share of landings from hover, shape (n,).
         flown: Threshold and class of each flight near this moment.
     """
 
     approach: tuple[float, float]
-    moment_y_Nmm: float
-    rrev_c_per_s: FloatArray
+    moment_Nmm: float
+    threshold_per_s: FloatArray
     rate: FloatArray
     flown: tuple[tuple[float, int], ...]
 
     def has(self, flip: Flip) -> bool:
         """True for a flight of this approach and nearly this moment."""
-        return flip.approach == self.approach and abs(flip.moment_y_Nmm - self.moment_y_Nmm) <= GROUP_NMM
+        return flip.approach == self.approach and abs(flip.moment_Nmm - self.moment_Nmm) <= GROUP_NMM
 
     def span(self) -> tuple[float, float] | None:
         """Smallest and largest threshold at which half of the simulated landings succeed; None if there is none."""
-        good = self.rrev_c_per_s[self.rate >= _WINDOW_RATE]
+        good = self.threshold_per_s[self.rate >= _WINDOW_RATE]
         return (float(good.min()), float(good.max())) if len(good) else None
 
     def flown_span(self) -> tuple[float, float] | None:
@@ -116,7 +116,7 @@ class Comparison:
             **self._outcomes(),
             "windows": [self._window(window) for window in self.windows],
             "policies": [
-                {"rrev_c_per_s": rrev, "moment_y_Nmm": moment, "rate": rate} for rrev, moment, rate in self.at_policies
+                {"threshold_per_s": rrev, "moment_Nmm": moment, "rate": rate} for rrev, moment, rate in self.at_policies
             ],
         }
 
@@ -149,10 +149,10 @@ class Comparison:
         return {
             "speed_mps": window.approach[0],
             "angle_deg": window.approach[1],
-            "moment_y_Nmm": window.moment_y_Nmm,
-            "simulated_rrev_c_per_s": window.span(),
-            "landed_rrev_c_per_s": window.flown_span(),
-            "rrev_c_per_s": window.rrev_c_per_s.tolist(),
+            "moment_Nmm": window.moment_Nmm,
+            "simulated_threshold_per_s": window.span(),
+            "landed_threshold_per_s": window.flown_span(),
+            "threshold_per_s": window.threshold_per_s.tolist(),
             "rate": window.rate.tolist(),
         }
 
@@ -227,7 +227,7 @@ def compare(
         usual = _usual([_room(flip) for flip in found if flip.approach == approach])
         alike = [flip for flip in found if flip.approach == approach and _room(flip) == usual]
         site = in_room(home, alike[0]) if alike else home
-        groups = _groups([flip for flip in alike if np.isfinite(flip.rrev_c_per_s)])
+        groups = _groups([flip for flip in alike if np.isfinite(flip.threshold_per_s)])
         windows = tuple(_window(site, approach, group, moment) for moment, group in groups)
         at_policies = [
             (rrev, moment, _rate(site, approach, rrev, moment, _POLICY_ROLLOUTS)) for rrev, moment in policies
@@ -334,7 +334,7 @@ def _predict(
     world: World, flip: Flip, n: int, rng: np.random.Generator, known: Uncertainty
 ) -> tuple[float, float, float]:
     state = scattered(motion.start_state(world, flip), n, rng, known)
-    moments = np.clip(flip.moment_y_Nmm * (1.0 + rng.normal(0.0, known.moment_norm, n)), 0.0, None)
+    moments = np.clip(flip.moment_Nmm * (1.0 + rng.normal(0.0, known.moment_norm, n)), 0.0, None)
     seed = int(rng.integers(2**62))
     outcomes = world.rollouts(*motion.FLIP_AT_ONCE, moments, seed=seed, start="state", state=state)
     legs = np.asarray(outcomes.n_legs)
@@ -355,7 +355,7 @@ def _room(flip: Flip) -> tuple[float, float]:
 
 def _groups(found: Sequence[Flip]) -> list[tuple[float, list[Flip]]]:
     """Flights of nearly the same moment, largest group first; groups of a few flights only are left out."""
-    moments = np.array([flip.moment_y_Nmm for flip in found])
+    moments = np.array([flip.moment_Nmm for flip in found])
     left = np.ones(len(found), dtype=bool)
     groups = []
     while left.any():
@@ -370,19 +370,19 @@ def _groups(found: Sequence[Flip]) -> list[tuple[float, list[Flip]]]:
     return groups
 
 
-def _window(world: World, approach: tuple[float, float], group: Sequence[Flip], moment_y_Nmm: float) -> Window:
-    thresholds = [flip.rrev_c_per_s for flip in group]
+def _window(world: World, approach: tuple[float, float], group: Sequence[Flip], moment_Nmm: float) -> Window:
+    thresholds = [flip.threshold_per_s for flip in group]
     low, high = min(thresholds) - _WINDOW_MARGIN_PER_S, max(thresholds) + _WINDOW_MARGIN_PER_S
     grid = np.arange(max(low, 0.5), high, _WINDOW_STEP_PER_S)
-    rate = np.array([_rate(world, approach, float(rrev), moment_y_Nmm, _WINDOW_ROLLOUTS) for rrev in grid])
-    flown = [(flip.rrev_c_per_s, class_of(flip.n_legs)) for flip in group]
+    rate = np.array([_rate(world, approach, float(rrev), moment_Nmm, _WINDOW_ROLLOUTS) for rrev in grid])
+    flown = [(flip.threshold_per_s, class_of(flip.n_legs)) for flip in group]
     known = tuple((rrev, legs) for rrev, legs in flown if legs is not None)
-    return Window(approach, moment_y_Nmm, grid, rate, known)
+    return Window(approach, moment_Nmm, grid, rate, known)
 
 
-def _rate(world: World, approach: tuple[float, float], rrev_c_per_s: float, moment_y_Nmm: float, n: int) -> float:
+def _rate(world: World, approach: tuple[float, float], threshold_per_s: float, moment_Nmm: float, n: int) -> float:
     streams = np.arange(n, dtype=np.uint64)
-    outcomes = world.rollouts(*approach, rrev_c_per_s, moment_y_Nmm, start="flown", stream=streams)
+    outcomes = world.rollouts(*approach, threshold_per_s, moment_Nmm, start="flown", stream=streams)
     return float(np.mean(np.asarray(outcomes.n_legs) >= LANDED_LEGS))
 
 

@@ -20,8 +20,8 @@ _SAME = 0.01
 """Two numbers for one thing may differ by this share: a log is rounded."""
 _LEGS_MAX = 4
 _OPTIONS = {
-    "rrev_c_per_s": "--rrev",
-    "moment_y_Nmm": "--moment",
+    "threshold_per_s": "--rrev",
+    "moment_Nmm": "--moment",
     "speed_mps": "--speed",
     "angle_deg": "--angle",
     "h_plane_m": "--h-plane",

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ivl import native
-from ivl.errors import ConfigError
+from ivl import forms, native
+from ivl.errors import ArgumentError, ConfigError
 from ivl.flight import phases
 from ivl.flight.store import Flight, FloatArray
 from ivl.world import World
@@ -39,7 +39,7 @@ class Ticks:
         fed: False for a sample that a later one replaced before a tick came.
         begins: Sample at which the approach begins; the number of samples if there is none.
         begun_by: What told so: "phase", "set-point", "closing speed", or "nothing".
-        policy: RREV_c in 1/s and M_yd in N m as committed.
+        policy: Number of the form, and parameters in SI units, as committed.
         config: Configuration of the core, one record.
         notes: What was not in the log, one phrase each.
     """
@@ -49,7 +49,7 @@ class Ticks:
     fed: npt.NDArray[np.bool_]
     begins: int
     begun_by: str
-    policy: tuple[float, float]
+    policy: tuple[int, FloatArray]
     config: npt.NDArray[np.void]
     notes: tuple[str, ...]
 
@@ -105,7 +105,7 @@ def make(flight: Flight, world: World, battery: bool = False) -> Ticks:
         _tell_request(inputs, flight, begins, latest, config)
     if battery:
         _tell_battery(inputs, flight, latest)
-    policy, policy_note = _policy(flight, config)
+    policy, policy_note = _policy(flight)
     notes += [policy_note] if policy_note else []
     notes += [] if np.isfinite(flight.info["h_plane_m"]) else ["the plane of the cues is the world's, not the log's"]
     return Ticks(inputs, seen, np.append(np.diff(seen) > 0, True), begins, begun_by, policy, config, tuple(notes))
@@ -154,12 +154,19 @@ def _configure(flight: Flight, world: World) -> npt.NDArray[np.void]:
     return config
 
 
-def _policy(flight: Flight, config: npt.NDArray[np.void]) -> tuple[tuple[float, float], str]:
+def _policy(flight: Flight) -> tuple[tuple[int, FloatArray], str]:
     """What is committed; without a policy in the log the largest threshold, and nothing is said about the trigger."""
-    rrev_c_per_s, moment_y_Nmm = (float(flight.info[name]) for name in ("rrev_c_per_s", "moment_y_Nmm"))
-    if np.isnan(rrev_c_per_s):
-        return (float(config["ivl.rrev_c_max"][0]), 0.0), "no policy in the log: the trigger is not compared"
-    return (rrev_c_per_s, 0.0 if np.isnan(moment_y_Nmm) else moment_y_Nmm * 1.0e-3), ""
+    form, theta, note = forms.by_name(forms.PAPER), [0.0, 0.0], ""
+    try:
+        if flight.info["form"]:
+            form, theta = forms.by_name(flight.info["form"]), [float(text) for text in flight.info["theta"].split()]
+        else:
+            theta = [float(flight.info["threshold_per_s"]), np.nan_to_num(float(flight.info["moment_Nmm"]))]
+        if np.isnan(theta[0]):
+            theta, note = [form.params[0].hi, 0.0], "no policy in the log: the trigger is not compared"
+        return (form.number, form.to_si(theta)), note
+    except (ArgumentError, ValueError) as error:
+        raise ConfigError(f"flight {flight.label}: policy: {error}") from error
 
 
 def _clock_us(t_s: FloatArray) -> npt.NDArray[np.uint64]:

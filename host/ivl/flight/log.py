@@ -25,8 +25,8 @@ class Given:
 
     Attributes:
         licence: Terms under which the data may be passed on.
-        rrev_c_per_s: Policy, where the log does not say; 1/s.
-        moment_y_Nmm: Policy, where the log does not say; N mm.
+        threshold_per_s: Policy, where the log does not say; 1/s.
+        moment_Nmm: Policy, where the log does not say; N mm.
         speed_mps: Approach speed, where the log does not say; m/s.
         angle_deg: Approach angle, where the log does not say; degrees.
         h_plane_m: Height of the plane of the cues, where the log does not say; m.
@@ -38,8 +38,8 @@ class Given:
     """
 
     licence: str = ""
-    rrev_c_per_s: float | None = None
-    moment_y_Nmm: float | None = None
+    threshold_per_s: float | None = None
+    moment_Nmm: float | None = None
     speed_mps: float | None = None
     angle_deg: float | None = None
     h_plane_m: float | None = None

@@ -44,8 +44,8 @@ class Flip:
 
     Attributes:
         label: Of the flight.
-        moment_y_Nmm: Policy's moment, magnitude.
-        rrev_c_per_s: Policy's threshold, NaN if it is not known.
+        moment_Nmm: Policy's moment, magnitude.
+        threshold_per_s: Policy's threshold, NaN if it is not known.
         approach: Speed (m/s) and angle (degrees) that were asked for, None if they are not known.
         h_plane_m: Height of the plane of the cues in W.
         h_surface_m: Height of the ceiling's surface in W, NaN if it was not measured.
@@ -64,8 +64,8 @@ class Flip:
     """
 
     label: str
-    moment_y_Nmm: float
-    rrev_c_per_s: float
+    moment_Nmm: float
+    threshold_per_s: float
     approach: tuple[float, float] | None
     h_plane_m: float
     h_surface_m: float
@@ -126,8 +126,8 @@ def flip(flight: Flight) -> Flip:
     rate = -flight["w_y_radps"]
     return Flip(
         label=flight.label,
-        moment_y_Nmm=float(flight.info["moment_y_Nmm"]),
-        rrev_c_per_s=float(flight.info["rrev_c_per_s"]),
+        moment_Nmm=float(flight.info["moment_Nmm"]),
+        threshold_per_s=float(flight.info["threshold_per_s"]),
         approach=_approach(flight),
         h_plane_m=float(flight.info["h_plane_m"]),
         h_surface_m=float(flight.info["h_surface_m"]),
@@ -205,7 +205,7 @@ def fly(world: World, flip: Flip, state: State | None = None, seed: int = 0) -> 
         seed: Of the scatter that the vehicle has.
     """
     start = start_state(world, flip) if state is None else state
-    trace = world.trace(*FLIP_AT_ONCE, flip.moment_y_Nmm, seed=seed, start="state", state=start,
+    trace = world.trace(*FLIP_AT_ONCE, flip.moment_Nmm, seed=seed, start="state", state=start,
                         period_s=_TRACE_PERIOD_S)  # fmt: skip
     rows = trace.rows
     if len(rows) < 2:
@@ -307,7 +307,7 @@ def _trigger_age(flight: Flight) -> float:
 
 
 def _check(flight: Flight) -> None:
-    for name in ("t_trigger_s", "moment_y_Nmm", "h_plane_m"):
+    for name in ("t_trigger_s", "moment_Nmm", "h_plane_m"):
         if not np.isfinite(flight.info[name]):
             missing = "it did not trigger" if name == "t_trigger_s" else f"{name} is not known"
             raise ConfigError(f"flight {flight.label}: {missing}")

@@ -90,10 +90,9 @@ def _replay(flight: Flight, world: World, chips: Chips | None, battery: bool) ->
     if chips:
         chips.check()
     if refused:
-        (rrev_c_per_s, moment_Nm), config = ticks.policy, ticks.config
-        rrev_most, moment_most_Nm = (float(config[f"ivl.{name}"][0]) for name in ("rrev_c_max", "moment_y_max"))
+        most_Nmm = 1e3 * float(ticks.config["ivl.flip_moment_max"][0])
         raise ConfigError(
-            f"flight {flight.label}: RREV_c {rrev_c_per_s:g} 1/s, M_yd {1e3 * moment_Nm:g} N mm: {refused} refused by "
-            f"the flight core (allowed 0 .. {rrev_most:g} 1/s, 0 .. {1e3 * moment_most_Nm:g} N mm)"
+            f"flight {flight.label}: {refused} refused by the flight core (policy {ticks.policy[1].tolist()} in SI units; "
+            f"moments up to {most_Nmm:g} N mm are allowed)"
         )
     return Replayed(flight, ticks, rows)

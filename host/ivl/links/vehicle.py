@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 from enum import IntFlag
 
 import numpy as np
+import numpy.typing as npt
 
 from ivl import native
 from ivl.errors import LinkError, RolloutError
+from ivl.forms import Form
 from ivl.links import recorder
 from ivl.links.clock import Clock, WallClock
 from ivl.links.packets import (
@@ -27,6 +29,7 @@ from ivl.links.packets import (
     Status,
     decode,
     encode,
+    encode_policy,
     encode_reading,
 )
 from ivl.links.tables import LogBlock, Session
@@ -38,6 +41,8 @@ _PORT_SUPERVISOR, _PORT_HL, _PORT_PLATFORM, _APP = 9, 8, 13, 2
 _ECHO_S, _CALL_S, _WALL_LOOK_S = 2.0, 0.01, 0.01
 _WALL_POLL_S = 0.005
 _LOGS_S = 3.0
+_ON_ITS_WAY = (Status.INCOMPLETE, Status.CRC)
+"""What an echo says while the parts of a policy have not all come."""
 
 
 class Supervisor(IntFlag):

@@ -43,7 +43,7 @@ def draw(comparison: Comparison, world_of_row: Sequence[World], paths: Sequence[
         axis.set_xlabel("time since the trigger (s)")
         style.finish(axis)
     _draw_windows(axes[1, 1], comparison.windows, comparison.at_policies)
-    moment = np.median([comparison.rows[i].flip.moment_y_Nmm for i in chosen])
+    moment = np.median([comparison.rows[i].flip.moment_Nmm for i in chosen])
     figure.suptitle(f"{title}: {len(chosen)} of {len(comparison.rows)} flights, M_yd about {moment:.2f} N mm",
                     fontsize=style.NORMAL)  # fmt: skip
     handles = [axes[0, 0].plot([], [], color=_COLOURS[c], label=f"flown, {_ENDINGS[c]}")[0] for c in compare.CLASSES]
@@ -83,8 +83,8 @@ def _draw_signal(axis: Axes, rows: Sequence[Row], name: str, bands: Sequence[tup
 
 def _draw_windows(axis: Axes, windows: Sequence[Window], policies: Sequence[tuple[float, float, float]]) -> None:
     for window, colour in zip(windows, (style.BLUE, style.PURPLE, style.SKY, style.GREY), strict=False):
-        axis.plot(window.rrev_c_per_s, window.rate, color=colour, linewidth=1.5,
-                  label=f"simulated, {window.moment_y_Nmm:.2f} N mm")  # fmt: skip
+        axis.plot(window.threshold_per_s, window.rate, color=colour, linewidth=1.5,
+                  label=f"simulated, {window.moment_Nmm:.2f} N mm")  # fmt: skip
         for rrev, legs in window.flown:
             place = {4: 1.04, 2: -0.04, 0: -0.09}[legs]
             axis.plot(rrev, place, "|", color=_COLOURS[legs], markersize=7)

@@ -72,8 +72,8 @@ def _panel(axis: Axes, r: Replayed) -> None:
     seen = np.where(r.rows["cue_valid"] != 0, r.rows["rrev_per_s"], np.nan)
     axis.plot(tick_s[ticks], seen[ticks], color=style.BLUE, linewidth=1.0)
     axis.plot(t_s[samples], r.flight["rrev_per_s"][samples], color="black", marker=".", markersize=3, linestyle="none")
-    if np.isfinite(r.flight.info["rrev_c_per_s"]):
-        axis.axhline(r.flight.info["rrev_c_per_s"], color=style.GREY, linestyle="--", linewidth=0.8)
+    if np.isfinite(r.flight.info["threshold_per_s"]):
+        axis.axhline(r.flight.info["threshold_per_s"], color=style.GREY, linestyle="--", linewidth=0.8)
     if r.logged_trigger_s is not None:
         axis.axvline(r.logged_trigger_s, color="black", linestyle=":", linewidth=1.2)
     if r.trigger_s is not None:

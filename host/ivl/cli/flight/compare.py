@@ -95,14 +95,14 @@ def _report(summary: dict[str, Any], name: str) -> None:
     if summary["n_judged"]:
         _report_outcomes(summary, line)
     for window in summary["windows"]:
-        simulated, flown = window["simulated_rrev_c_per_s"], window["landed_rrev_c_per_s"]
+        simulated, flown = window["simulated_threshold_per_s"], window["landed_threshold_per_s"]
         text = f"simulated {_span(simulated)}, flown landings {_span(flown)} 1/s"
         line(
-            f"window at {window['moment_y_Nmm']:.2f} N mm",
+            f"window at {window['moment_Nmm']:.2f} N mm",
             f"{text}, at {window['speed_mps']:g} m/s and {window['angle_deg']:g} deg",
         )
     for one in summary["policies"]:
-        line(f"rate at ({one['rrev_c_per_s']:g}, {one['moment_y_Nmm']:g}), from hover", f"{one['rate']:.2f}")
+        line(f"rate at ({one['threshold_per_s']:g}, {one['moment_Nmm']:g}), from hover", f"{one['rate']:.2f}")
 
 
 def _report_outcomes(summary: dict[str, Any], line: Any) -> None:

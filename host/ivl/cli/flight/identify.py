@@ -65,7 +65,7 @@ def identify(
     sigmas = {text.partition("=")[0]: _number(text) for text in sigma or []}
     result = library.identify(
         flights, vehicle, gear, gear_set, names, options.overrides(settings), sigmas,
-        lambda i, flip: (hold_out > 0 and i % hold_out == hold_out - 1) or low <= flip.moment_y_Nmm <= high,
+        lambda i, flip: (hold_out > 0 and i % hold_out == hold_out - 1) or low <= flip.moment_Nmm <= high,
         seed, None if as_json else console.say,
     )  # fmt: skip
     _write(out, library.vehicle_file(vehicle, result, _source(flights, result)))

@@ -80,8 +80,8 @@ def _table(rows: list[dict[str, Any]]) -> Table:
     for row in rows:
         table.add_row(
             row["label"],
-            console.number(row["rrev_c_per_s"]),
-            console.number(row["moment_y_Nmm"]),
+            console.number(row["threshold_per_s"]),
+            console.number(row["moment_Nmm"]),
             console.number(row["speed_mps"], 1),
             console.number(row["angle_deg"], 0),
             str(row["n_samples"]),

@@ -253,7 +253,7 @@ def _asked(columns: dict[str, FloatArray], first: int | None, by_command: bool) 
     """Policy and approach, as far as the samples tell; half of the commanded moment is that of the policy."""
     result = {}
     if by_command and first is not None:
-        result["moment_y_Nmm"] = -500 * float(columns["moment_cmd_y_Nm"][first])
+        result["moment_Nmm"] = -500 * float(columns["moment_cmd_y_Nm"][first])
     if all(f"set_v_{axis}_mps" in columns for axis in "xyz"):
         row = first if first is not None else -1
         result |= _approach([float(columns[f"set_v_{axis}_mps"][row]) for axis in "xyz"])
@@ -273,7 +273,7 @@ def _summary(summaries: Table, row: int, notes: list[str]) -> dict[str, Any]:
     if len(policy) < 2:
         text = border.shorten(one.text("policy")[0])
         raise one.fault(0, "policy", f"value '{text}': expected [RREV_c M_yd]")
-    info: dict[str, Any] = {"rrev_c_per_s": policy[0], "moment_y_Nmm": policy[1]}
+    info: dict[str, Any] = {"threshold_per_s": policy[0], "moment_Nmm": policy[1]}
     v_mps = [float(one.numbers(name)[0]) for name in ("vx", "vy", "vz")]
     if np.isfinite(v_mps).all():
         info |= _approach(v_mps)

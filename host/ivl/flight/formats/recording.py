@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ivl import campaign, native
+from ivl import campaign, forms, native
 from ivl.errors import ConfigError, IvlError
 from ivl.flight import table as border
 from ivl.flight.log import Format, Given, Log, with_rules
@@ -110,12 +110,15 @@ def _database(folder: Path) -> dict[str, dict[str, Any]]:
         for i in range(len(rows)):
             label = f"ep{rows.episode[i]}-run{rows.idx[i]}"
             label = f"trial{trial}-{label}" if n_trials else label
-            result[f"{seed:016x}-{rows.stream[i]}"] = {"label": label, **site, **_rollout(rows, i)}
+            result[f"{seed:016x}-{rows.stream[i]}"] = {"label": label, **site, **_rollout(experiment.policy.shape, rows, i)}
     return result
 
 
-def _rollout(rows: RolloutRows, i: int) -> dict[str, Any]:
-    info: dict[str, Any] = {"rrev_c_per_s": float(rows.theta[i, 0]), "moment_y_Nmm": float(rows.theta[i, 1])}
+def _rollout(form: forms.Form, rows: RolloutRows, i: int) -> dict[str, Any]:
+    theta = rows.theta[i].tolist()
+    info: dict[str, Any] = {"form": form.name, "theta": " ".join(repr(value) for value in theta)}
+    if form.name == forms.PAPER:
+        info |= dict(zip(("threshold_per_s", "moment_Nmm"), theta, strict=True))
     if rows.status[i] != SCORED:
         return {**info, "usable": False, "note": f"the run says: {rows.status[i]}"}
     outcome = rows.outcomes[i]
