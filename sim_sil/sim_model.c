@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-#include "sim_step.h"
+#include "world_step_size.h"
 
 typedef struct
 {

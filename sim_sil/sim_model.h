@@ -10,8 +10,8 @@
 #include <stddef.h>
 
 #include "ivl.h"
+#include "phys_math.h"
 #include "sim_core.h"
-#include "sim_math.h"
 #include "sim_params.h"
 
 enum

@@ -1,7 +1,7 @@
 /// @file test_sim_reading.c
 /// Camera, ranging and flow sensor of the world, low-passes of the autopilot, dead reckoning.
 #include "sim_fixture.h"
-#include "sim_sensors.h"
+#include "world_sensors.h"
 
 static const ivl_sim_rng_t RNG = {7, 8};
 static ivl_sim_sensors_t   sensors;

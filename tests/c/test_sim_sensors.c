@@ -1,6 +1,6 @@
 /// @file test_sim_sensors.c
 /// What the flight core is told: when samples are taken and delivered, how noisy they are, what an accelerometer feels.
-#include "sim_sensors.h"
+#include "world_sensors.h"
 
 #include "sim_fixture.h"
 
