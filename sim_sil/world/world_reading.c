@@ -2,50 +2,22 @@
 
 #include "world_clock.h"
 
-/// Nearer than this a sensor sees nothing but the ceiling's paint, and 1/d need not be finite.
-static const double D_MIN_M = 1.0e-3;
-
-/// One sensor's numbers; `rate_hz` 0: there is none.
-typedef struct
+bool ivl_sim_readings_any(const ivl_sim_model_t *model)
 {
-    double         rate_hz, delay_s, noise, noise_norm, bias, resolution, lo, hi, drop_norm;
-    ivl_sim_draw_t draw_noise, draw_drop;
-} sensor_t;
-
-static sensor_t sensor_of(const ivl_sim_params_t *raw, int kind)
-{
-    switch (kind)
+    bool any = false;
+    for (size_t i = 0; i < model->readings->n; i++)
     {
-    case IVL_SIM_READING_RREV:
-        return (sensor_t){
-            raw->rrev_rate_hz,          raw->rrev_delay_s,    raw->rrev_noise_per_s, raw->rrev_noise_rel_norm, 0.0,
-            raw->rrev_resolution_per_s, -raw->rrev_max_per_s, raw->rrev_max_per_s,   raw->rrev_drop_norm,      IVL_SIM_DRAW_RREV,
-            IVL_SIM_DRAW_RREV_DROP};
-    case IVL_SIM_READING_RANGE:
-        return (sensor_t){raw->range_rate_hz,   raw->range_delay_s,      raw->range_noise_m,     0.0,
-                          raw->range_bias_m,    raw->range_resolution_m, raw->range_min_m,       raw->range_max_m,
-                          raw->range_drop_norm, IVL_SIM_DRAW_RANGE,      IVL_SIM_DRAW_RANGE_DROP};
-    default:
-        return (sensor_t){raw->flow_rate_hz,
-                          raw->flow_delay_s,
-                          raw->flow_noise_radps,
-                          0.0,
-                          0.0,
-                          raw->flow_resolution_radps,
-                          -raw->flow_max_radps,
-                          raw->flow_max_radps,
-                          raw->flow_drop_norm,
-                          IVL_SIM_DRAW_FLOW,
-                          IVL_SIM_DRAW_FLOW_DROP};
+        any = any || model->readings->row[i].sensor(&model->raw).rate_hz > 0.0;
     }
+    return any;
 }
 
-void ivl_sim_readings_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, ivl_sim_reading_t readings[IVL_SIM_READINGS])
+void ivl_sim_readings_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, ivl_sim_reading_t readings[IVL_SIM_READINGS_MAX])
 {
-    for (int kind = 0; kind < IVL_SIM_READINGS; kind++)
+    for (size_t k = 0; k < model->readings->n; k++)
     {
-        const sensor_t     sensor = sensor_of(&model->raw, kind);
-        ivl_sim_reading_t *reading = &readings[kind];
+        const ivl_sim_sensor_t sensor = model->readings->row[k].sensor(&model->raw);
+        ivl_sim_reading_t     *reading = &readings[k];
         reading->n_taken = 0;
         reading->n_delivered = 0;
         if (sensor.rate_hz > 0.0)
@@ -53,31 +25,12 @@ void ivl_sim_readings_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rn
             double n[4];
             ivl_sim_normal4(rng, sensor.draw_noise, UINT32_MAX, n);
             reading->bias = sensor.bias * n[0];
-            reading->next_s = ivl_sim_uniform(rng, IVL_SIM_DRAW_SENSOR_PHASE, 1u + (uint32_t)kind) / sensor.rate_hz;
+            reading->next_s = ivl_sim_uniform(rng, IVL_SIM_DRAW_SENSOR_PHASE, 1u + (uint32_t)k) / sensor.rate_hz;
         }
     }
 }
 
-/// True value at an instant `age_s` ago; a range is infinite where the ceiling is out of the sensor's sight.
-static double truth(const ivl_sim_model_t *model, const ivl_sim_kin_t *state, const double a_W_mps2[3], double age_s, int kind)
-{
-    const double plane = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m;
-    const double z = state->p_WB_m[2] - age_s * (state->v_WB_mps[2] - 0.5 * age_s * a_W_mps2[2]);
-    const double d = (plane - z > D_MIN_M) ? plane - z : D_MIN_M;
-    if (kind == IVL_SIM_READING_RREV)
-    {
-        return (state->v_WB_mps[2] - age_s * a_W_mps2[2]) / d;
-    }
-    if (kind == IVL_SIM_READING_FLOW)
-    {
-        return -(state->v_WB_mps[0] - age_s * a_W_mps2[0]) / d;
-    }
-    const double *q = state->q_WB;
-    const double  up = 1.0 - 2.0 * (q[0] * q[0] + q[1] * q[1]);
-    return (up > 0.0) ? d / up : (double)INFINITY;
-}
-
-static void take(const sensor_t *sensor, const ivl_sim_rng_t *rng, double value, ivl_sim_reading_t *reading)
+static void take(const ivl_sim_sensor_t *sensor, const ivl_sim_rng_t *rng, double value, ivl_sim_reading_t *reading)
 {
     const uint32_t i = reading->n_taken % IVL_SIM_READING_QUEUE;
     double         n[4];
@@ -111,19 +64,20 @@ static void deliver(double t_s, ivl_sim_reading_t *reading, ivl_reading_t *in)
     }
 }
 
-void ivl_sim_readings_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, const double a_W_mps2[3],
-                           double t_s, ivl_sim_reading_t readings[IVL_SIM_READINGS], ivl_in_t *in)
+void ivl_sim_readings_read(const ivl_sim_scene_t *scene, const ivl_sim_rng_t *rng, double t_s,
+                           ivl_sim_reading_t readings[IVL_SIM_READINGS_MAX], ivl_in_t *in)
 {
-    ivl_reading_t *const told[IVL_SIM_READINGS] = {&in->rrev, &in->range, &in->flow};
-    for (int kind = 0; kind < IVL_SIM_READINGS; kind++)
+    const ivl_sim_model_t *model = scene->model;
+    for (size_t k = 0; k < model->readings->n; k++)
     {
-        const sensor_t     sensor = sensor_of(&model->raw, kind);
-        ivl_sim_reading_t *reading = &readings[kind];
+        const ivl_sim_reading_row_t *row = &model->readings->row[k];
+        const ivl_sim_sensor_t       sensor = row->sensor(&model->raw);
+        ivl_sim_reading_t           *reading = &readings[k];
         // a tick brings a few samples; were it more than the queue holds, the rest would wait for the next one
         for (int i = 0; i < IVL_SIM_READING_QUEUE && sensor.rate_hz > 0.0 && reading->next_s <= t_s + IVL_SIM_TIME_SLACK_S; i++)
         {
-            take(&sensor, rng, truth(model, state, a_W_mps2, t_s - reading->next_s, kind), reading);
+            take(&sensor, rng, row->truth(scene, t_s - reading->next_s), reading);
         }
-        deliver(t_s, reading, told[kind]);
+        deliver(t_s, reading, row->into(in));
     }
 }

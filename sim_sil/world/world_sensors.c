@@ -195,14 +195,15 @@ static void reckon(const ivl_sim_model_t *model, const double accel[3], double t
     in->v_WB_mps = to_float3(own->v_W_mps);
 }
 
-void ivl_sim_sensors_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, const double a_W_mps2[3],
-                          double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in)
+void ivl_sim_sensors_read(const ivl_sim_scene_t *scene, const ivl_sim_rng_t *rng, double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in)
 {
-    double gyro[3], accel[3];
+    const ivl_sim_model_t *model = scene->model;
+    const ivl_sim_kin_t   *state = scene->kin;
+    double                 gyro[3], accel[3];
     // a tick brings a few samples; were it more than the queue holds, the rest would wait for the next one
     for (int i = 0; i < IVL_SIM_POSE_QUEUE && sensors->next_s <= t_s + IVL_SIM_TIME_SLACK_S; i++)
     {
-        take_pose(model, rng, state, a_W_mps2, t_s - sensors->next_s, sensors);
+        take_pose(model, rng, state, scene->a_W_mps2, t_s - sensors->next_s, sensors);
     }
     deliver(model, t_s, sensors);
     in->t_us = ivl_sim_clock_us(t_s);
@@ -224,7 +225,7 @@ void ivl_sim_sensors_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng
     }
     if (model->has_readings)
     {
-        ivl_sim_readings_read(model, rng, state, a_W_mps2, t_s, sensors->readings, in);
+        ivl_sim_readings_read(scene, rng, t_s, sensors->readings, in);
     }
     sensors->n_tick++;
 }

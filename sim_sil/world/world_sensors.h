@@ -30,15 +30,13 @@ typedef struct
     double                  gyro_bias_radps[3], accel_bias_mps2[3];
     ivl_sim_lowpass_state_t gyro_lowpass, accel_lowpass;
     ivl_sim_reckoning_t     reckoning;  ///< with sense.inertial or sense.attitude_integrated
-    ivl_sim_reading_t       readings[IVL_SIM_READINGS];
+    ivl_sim_reading_t       readings[IVL_SIM_READINGS_MAX];
 } ivl_sim_sensors_t;
 
 /// A sensor that has watched the vehicle move at its present velocity for a while.
 void ivl_sim_sensors_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, ivl_sim_sensors_t *sensors);
 
 /// Fills the sensed part of the core's input for the tick at time t.
-/// @param[in] a_W_mps2  present acceleration, to place samples between ticks
-void ivl_sim_sensors_read(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng, const ivl_sim_kin_t *state, const double a_W_mps2[3],
-                          double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in);
+void ivl_sim_sensors_read(const ivl_sim_scene_t *scene, const ivl_sim_rng_t *rng, double t_s, ivl_sim_sensors_t *sensors, ivl_in_t *in);
 
 #endif  // IVL_WORLD_SENSORS_H

@@ -10,9 +10,9 @@ static void set_due(ivl_sim_world_t *w, double span_s)
 
 static void body_of(const ivl_sim_state_t *s, int lane, ivl_sim_kin_t *kin)
 {
-    ivl_d3_store(kin->p_WB_m, ivl_d3(s->p_WB_m.x[lane], s->p_WB_m.y[lane], s->p_WB_m.z[lane]));
-    ivl_d3_store(kin->v_WB_mps, ivl_d3(s->v_WB_mps.x[lane], s->v_WB_mps.y[lane], s->v_WB_mps.z[lane]));
-    ivl_d3_store(kin->w_B_radps, ivl_d3(s->w_B_radps.x[lane], s->w_B_radps.y[lane], s->w_B_radps.z[lane]));
+    ivl_d3_store(kin->p_WB_m, ivl_w3_lane(&s->p_WB_m, lane));
+    ivl_d3_store(kin->v_WB_mps, ivl_w3_lane(&s->v_WB_mps, lane));
+    ivl_d3_store(kin->w_B_radps, ivl_w3_lane(&s->w_B_radps, lane));
     for (int i = 0; i < 4; i++)
     {
         kin->q_WB[i] = s->q_WB[i][lane];
@@ -31,8 +31,9 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
     {
         ivl_sim_kin_t kin;  // of which sensors need the body's part
         body_of(&group->state, lane, &kin);
-        const double a[3] = {group->last.a_WB_mps2.x[lane], group->last.a_WB_mps2.y[lane], group->last.a_WB_mps2.z[lane]};
-        ivl_sim_sensors_read(model, &w->rng, &kin, a, w->t_s, &w->sensors, &w->in);
+        ivl_sim_scene_t scene = {.model = model, .kin = &kin};
+        ivl_d3_store(scene.a_W_mps2, ivl_w3_lane(&group->last.a_WB_mps2, lane));
+        ivl_sim_sensors_read(&scene, &w->rng, w->t_s, &w->sensors, &w->in);
         model->core.step(group->port, lane, &model->firmware, &w->firmware, &w->in, &w->out);
         ivl_sim_rotor_command(model, &w->rotor, w->out.thrust_N);
         const bool approaches = w->firmware.phase == IVL_PHASE_APPROACH;
