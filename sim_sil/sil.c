@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "sim_hover.h"
-#include "sim_replay.h"
-#include "sim_rollout.h"
+#include "world_hover.h"
+#include "world_replay.h"
+#include "world_rollout.h"
 
 enum
 {

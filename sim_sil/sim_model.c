@@ -3,7 +3,8 @@
 
 #include <stdio.h>
 
-#include "sim_step.h"
+#include "world_reading.h"
+#include "world_step_size.h"
 
 typedef struct
 {
@@ -178,7 +179,8 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
         return false;
     }
     model->tick_s = 1.0 / (double)model->firmware.tick_hz;
-    model->has_readings = raw->rrev_rate_hz > 0.0 || raw->range_rate_hz > 0.0 || raw->flow_rate_hz > 0.0;
+    model->readings = &ivl_sim_readings;
+    model->has_readings = ivl_sim_readings_any(model);
     const double rate = (double)model->firmware.tick_hz;
     if (!derive_lowpass(raw->sense_gyro_cutoff_hz, rate, &model->gyro_lowpass) ||
         !derive_lowpass(raw->sense_accel_cutoff_hz, rate, &model->accel_lowpass))

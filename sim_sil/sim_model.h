@@ -10,8 +10,8 @@
 #include <stddef.h>
 
 #include "ivl.h"
+#include "phys_math.h"
 #include "sim_core.h"
-#include "sim_math.h"
 #include "sim_params.h"
 
 enum
@@ -68,6 +68,9 @@ typedef struct
     double b[3], a[2];
 } ivl_sim_lowpass_t;
 
+/// Which sensors of one number there are: see world_reading.h.
+typedef struct ivl_sim_reading_table ivl_sim_reading_table_t;
+
 typedef struct
 {
     ivl_sim_params_t    raw;
@@ -80,12 +83,13 @@ typedef struct
     double leg_frequency_radps;  ///< of a leg swinging about its hip, body held
     double leg_damping_ratio;
     double reach_m;  ///< largest distance of any point of the vehicle from the body origin
-    ivl_sim_step_limits_t step;
-    ivl_cfg_t             firmware;
-    double                tick_s;  ///< of the firmware
-    ivl_sim_lowpass_t     gyro_lowpass, accel_lowpass;
-    bool                  has_readings;  ///< some sensor of one number beside the state estimate
-    ivl_sim_core_t        core;          ///< where the firmware runs
+    ivl_sim_step_limits_t          step;
+    ivl_cfg_t                      firmware;
+    double                         tick_s;  ///< of the firmware
+    ivl_sim_lowpass_t              gyro_lowpass, accel_lowpass;
+    const ivl_sim_reading_table_t *readings;      ///< sensors of one number beside the state estimate
+    bool                           has_readings;  ///< some of them is switched on
+    ivl_sim_core_t                 core;          ///< where the firmware runs
 } ivl_sim_model_t;
 
 /// Checks raw parameters and derives the model.

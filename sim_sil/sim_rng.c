@@ -1,6 +1,6 @@
 #include "sim_rng.h"
 
-#include "sim_math.h"
+#include "phys_math.h"
 
 static void philox_round(uint32_t c[4], const uint32_t k[2])
 {

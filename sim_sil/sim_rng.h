@@ -30,7 +30,8 @@ typedef enum
     IVL_SIM_DRAW_RREV_DROP,
     IVL_SIM_DRAW_RANGE_DROP,
     IVL_SIM_DRAW_FLOW_DROP,
-    IVL_SIM_DRAW_BATTERY,  ///< open-circuit voltage of a rollout
+    IVL_SIM_DRAW_BATTERY,       ///< open-circuit voltage of a rollout
+    IVL_SIM_DRAW_FURTHER = 32,  ///< the first of those that are left for further sensors, two each
 } ivl_sim_draw_t;
 
 typedef struct

@@ -28,7 +28,7 @@ WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-prom
 
 # no contraction and no -march: the same source gives the same bits on every machine and compiler
 CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPIC -pthread \
-          -Ifirmware/core -Isim_sil
+          -Ifirmware/core -Isim_sil -Isim_sil/physics -Isim_sil/world
 LDLIBS := -lm -pthread
 
 # objects of the release flavour also carry what GCC needs to optimise the library as a whole; the tests link them as they are
@@ -37,15 +37,11 @@ LTO_release := -flto -ffat-lto-objects
 LTO_LINK_release := -flto=auto
 endif
 
-# Further flags of a folder and of a single object, the latter by its name without folder and suffix:
-#     FLAGS_sim_dynamics := -mavx2 -mno-fma
-# A source that is compiled again under other flags is listed as <stem>@<variant>:
-#     VARIANTS := sim_dynamics@avx2
-#     FLAGS_sim_dynamics@avx2 := -mavx2 -mno-fma -DSIM_VARIANT=avx2
-VARIANTS :=
-
+# further flags of a folder, and of a single object by its name without folder and suffix
 # the simulator passes vectors by value, within one compilation only: the note that their ABI once changed is idle
 FLAGS_sim_sil := -Wno-psabi
+FLAGS_sim_sil/physics := $(FLAGS_sim_sil)
+FLAGS_sim_sil/world := $(FLAGS_sim_sil)
 FLAGS_sim_sil/pil := $(FLAGS_sim_sil) -Ifirmware/stm32f405
 
 # the software vehicle: the app's own sources, with the vehicle in the place of its SDK
@@ -78,7 +74,7 @@ endif
 
 BUILD   := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
-SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/pil/*.c)) $(VARIANTS:%=$(BUILD)/sim_sil/%.o)
+SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c))
 CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out %/app_controller.c %/app_cpx.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
@@ -154,8 +150,6 @@ $(BUILD)/%.o: %.c $(BUILD)/flags.txt
 $(BUILD)/unity.o: WARNINGS :=
 $(BUILD)/unity.o: $(UNITY)/unity.c tools/native.mk
 	$(compile)
-
-$(foreach v,$(VARIANTS),$(eval $(BUILD)/sim_sil/$v.o: sim_sil/$(firstword $(subst @, ,$v)).c $(BUILD)/flags.txt ; $$(compile)))
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
 ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(LTO_LINK_$(FLAVOUR)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))

@@ -9,7 +9,7 @@
 #ifndef IVL_CF_H
 #define IVL_CF_H
 #include "sim_model.h"
-#include "sim_rollout.h"
+#include "world_rollout.h"
 
 typedef struct ivl_cf ivl_cf_t;
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "ivl_math.h"
-#include "sim_math.h"
+#include "phys_math.h"
 
 // A wanted point that moves with a wanted velocity waits for the vehicle within this distance.
 static const float LEAD_M = 0.3f;

@@ -1,5 +1,7 @@
 #include "sim_fixture.h"
 
+#include "world_step_size.h"
+
 uint64_t draw_u64(draws_t *draws)
 {
     draws->state += 0x9e3779b97f4a7c15u;
@@ -153,6 +155,34 @@ void place_alone(const ivl_sim_model_t *model, ivl_sim_group_t *group, const ivl
     ivl_sim_world_place(group, 0, kin);
     ivl_sim_rotor_command(model, &world->rotor, off);
     memset(world->rotor.speed_radps, 0, sizeof world->rotor.speed_radps);
+}
+
+static bool all_ready(const ivl_sim_group_t *group)
+{
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        if (group->active[lane] && !ivl_sim_world_ready(group, lane))
+        {
+            return false;
+        }
+    }
+    return true;
+}
+
+void advance(ivl_sim_group_t *group, double dt_s)
+{
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        if (group->active[lane])
+        {
+            group->world[lane].left_s = dt_s;
+            group->world[lane].evaluations_left = ivl_sim_step_evaluations(&group->model->step, dt_s);
+        }
+    }
+    while (!all_ready(group))
+    {
+        ivl_sim_group_step(group);
+    }
 }
 
 ivl_sim_rate_t evaluate(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, const ivl_sim_foot_t foot[IVL_SIM_LEGS], double thrust_N,

@@ -2,8 +2,12 @@
 /// Shared by the tests of the simulator: a vehicle with its gear, random states that its legs allow, one vehicle in a group.
 #ifndef SIM_FIXTURE_H
 #define SIM_FIXTURE_H
-#include "sim_world.h"
+#include "phys_energy.h"
+#include "phys_impulse.h"
+#include "phys_plates.h"
+#include "phys_step.h"
 #include "unity.h"
+#include "world_group.h"
 
 /// splitmix64: the same draws on every machine, and none of the simulator's own generator.
 typedef struct
@@ -38,6 +42,10 @@ void nose_up(double angle, double q[4]);
 /// One vehicle in lane 0 of an otherwise empty group, motors at rest, no flight core in the loop.
 /// @param[in] held  feet that hold on from the start, where they are
 void place_alone(const ivl_sim_model_t *model, ivl_sim_group_t *group, const ivl_sim_kin_t *kin, const ivl_sim_foot_t held[IVL_SIM_LEGS]);
+
+/// Motion alone, for dt, with the rotor commands as they are; of all active worlds.  A world that takes more evaluations than
+/// such a motion can need gives up: it stays where it is, and `gave_up` says so.
+void advance(ivl_sim_group_t *group, double dt_s);
 
 /// Accelerations of one vehicle, by a step of no length.
 ivl_sim_rate_t evaluate(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, const ivl_sim_foot_t foot[IVL_SIM_LEGS], double thrust_N,

@@ -2,7 +2,7 @@
 /// Landings of the software vehicle: the same bits as in the host's process, with the app's own files in between.
 #include "cf_fixture.h"
 #include "ivl_record.h"
-#include "sim_rollout.h"
+#include "world_rollout.h"
 
 enum
 {

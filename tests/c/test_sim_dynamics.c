@@ -1,7 +1,6 @@
 /// @file test_sim_dynamics.c
 /// The lean equations of the simulator against a naive reference: every body and every rod with its own six coordinates,
 /// Newton and Euler for each, joints and held feet as constraints, one dense system (Karush-Kuhn-Tucker) for all.
-#include "sim_dynamics.h"
 
 #include "sim_fixture.h"
 

@@ -1,6 +1,6 @@
 /// @file test_sim_hover.c
 /// Hovers from set-point to set-point: rows, starts, lanes, set-points in time, flights that end, the flat interface.
-#include "sim_hover.h"
+#include "world_hover.h"
 
 #include "sil.h"
 #include "sim_fixture.h"

@@ -11,7 +11,7 @@ static void advance_ticks(int n)
 {
     for (int i = 0; i < n; i++)
     {
-        ivl_sim_group_advance(&group, TICK);
+        advance(&group, TICK);
     }
 }
 
@@ -199,7 +199,7 @@ static void test_a_leg_rings_with_its_frequency_and_damping(void)
     crossings_t c = {.n = 0};
     for (int i = 0; i < 6000; i++)
     {
-        ivl_sim_group_advance(&group, 2.0e-5);
+        advance(&group, 2.0e-5);
         const ivl_sim_kin_t now = ivl_sim_world_kin(&group, 0);
         const ivl_d3_t      hip = ivl_d3_add(ivl_d3_load(now.p_WB_m), model.leg.hip_B_m[0]);
         watch(&c, group.world[0].t_s, ivl_d3_dot(ivl_d3_sub(ivl_d3_load(now.p_foot_W_m[0]), hip), model.leg.sideways_B[0]) / L);
@@ -292,7 +292,7 @@ static void check_pendulum(const ivl_sim_foot_t foot[4], ivl_d3_t e, double foot
     const ivl_d3_t  e_W = ivl_rot_apply(&R0, e), side = ivl_d3_cross(e_W, ivl_d3(0.0, 0.0, 1.0));
     for (int i = 0; i < 8000; i++)
     {
-        ivl_sim_group_advance(&group, 0.0005);
+        advance(&group, 0.0005);
         const ivl_sim_kin_t now = ivl_sim_world_kin(&group, 0);
         const ivl_rot_t     R = ivl_rot_from_quat(now.q_WB);
         watch(&c, group.world[0].t_s, ivl_d3_dot(ivl_rot_apply(&R, arm), side) / l);

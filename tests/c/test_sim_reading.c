@@ -1,7 +1,7 @@
 /// @file test_sim_reading.c
 /// Camera, ranging and flow sensor of the world, low-passes of the autopilot, dead reckoning.
 #include "sim_fixture.h"
-#include "sim_sensors.h"
+#include "world_sensors.h"
 
 static const ivl_sim_rng_t RNG = {7, 8};
 static ivl_sim_sensors_t   sensors;
@@ -22,10 +22,16 @@ static void begin(const ivl_sim_model_t *model)
     ivl_sim_sensors_init(model, &RNG, &kin, &sensors);
 }
 
+static void look(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, const double a_W_mps2[3], double t, ivl_in_t *in)
+{
+    const ivl_sim_scene_t scene = {.model = model, .kin = kin, .a_W_mps2 = {a_W_mps2[0], a_W_mps2[1], a_W_mps2[2]}};
+    ivl_sim_sensors_read(&scene, &RNG, t, &sensors, in);
+}
+
 static void read_at(const ivl_sim_model_t *model, double t, ivl_in_t *in)
 {
     const ivl_sim_kin_t kin = moving(model, t);
-    ivl_sim_sensors_read(model, &RNG, &kin, A_MOVING, t, &sensors, in);
+    look(model, &kin, A_MOVING, t, in);
 }
 
 static void test_readings_are_the_truth_of_their_instant_and_arrive_after_their_delay(void)
@@ -95,7 +101,7 @@ static void test_noise_offset_rounding_limits_and_losses(void)
     ivl_in_t in = {.t_us = 0};
     for (int tick = 1; tick <= 20000; tick++)
     {
-        ivl_sim_sensors_read(&model, &RNG, &kin, still, 0.002 * tick, &sensors, &in);
+        look(&model, &kin, still, 0.002 * tick, &in);
         if (in.range.valid == 0)
         {
             n_invalid++;
@@ -112,6 +118,59 @@ static void test_noise_offset_rounding_limits_and_losses(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.1 + 0.9 * 0.0668, (double)n_invalid / 20000.0);
     TEST_ASSERT_DOUBLE_WITHIN(0.0006, -0.139 * 0.02, sum / n);
     TEST_ASSERT_DOUBLE_WITHIN(0.0006, 0.02 * sqrt(1.0 - 1.5 * 0.1388), sqrt(square / n));
+}
+
+// a row that only this test has: the height of the body origin, told in place of the flow
+static double height(const ivl_sim_scene_t *scene, double age_s)
+{
+    return scene->kin->p_WB_m[2] - age_s * (scene->kin->v_WB_mps[2] - 0.5 * age_s * scene->a_W_mps2[2]);
+}
+
+static ivl_sim_sensor_t altimeter(const ivl_sim_params_t *raw)
+{
+    return (ivl_sim_sensor_t){.rate_hz = 0.5 * raw->range_rate_hz,
+                              .delay_s = 0.008,
+                              .lo = 0.0,
+                              .hi = 10.0,
+                              .draw_noise = IVL_SIM_DRAW_FURTHER,
+                              .draw_drop = IVL_SIM_DRAW_FURTHER + 1};
+}
+
+static ivl_reading_t *into_flow(ivl_in_t *in)
+{
+    return &in->flow;
+}
+
+static void test_a_further_sensor_is_a_row(void)
+{
+    const ivl_sim_reading_row_t   rows[2] = {ivl_sim_readings.row[1],  // range, as it is
+                                             {.name = "height", .unit = "m", .truth = height, .sensor = altimeter, .into = into_flow}};
+    const ivl_sim_reading_table_t table = {.row = rows, .n = 2};
+    ivl_sim_params_t              params = fixture_params();
+    params.range_rate_hz = 100.0;
+    ivl_sim_model_t model = fixture_model(&params);
+    model.readings = &table;
+    TEST_ASSERT_TRUE(ivl_sim_readings_any(&model));
+    TEST_ASSERT_EQUAL_STRING("range", rows[0].name);
+    begin(&model);
+    ivl_in_t in = {.t_us = 0};
+    int      n = 0;
+    for (int tick = 0; tick < 125; tick++)
+    {
+        const uint64_t last_us = in.flow.t_us;
+        read_at(&model, 0.002 * tick, &in);
+        if (in.flow.t_us == last_us)
+        {
+            continue;
+        }
+        const ivl_sim_kin_t then = moving(&model, (double)in.flow.t_us * 1.0e-6 - 1.0 - 0.008);
+        TEST_ASSERT_EQUAL_UINT8(1, in.flow.valid);
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, (float)then.p_WB_m[2], in.flow.value);
+        n++;
+    }
+    TEST_ASSERT_INT_WITHIN(1, 12, n);
+    TEST_ASSERT_TRUE(in.range.t_us > 0);
+    TEST_ASSERT_EQUAL_UINT64(0, in.rrev.t_us);  // no row, no reading
 }
 
 static void test_a_low_pass_has_its_delay_and_corner(void)
@@ -181,7 +240,7 @@ static void test_an_attitude_from_a_clipped_gyro_lags_behind(void)
     for (int tick = 0; tick <= 25; tick++)
     {
         nose_up(50.0 * 0.002 * tick, kin.q_WB);
-        ivl_sim_sensors_read(&model, &RNG, &kin, A_MOVING, 0.002 * tick, &sensors, &in);
+        look(&model, &kin, A_MOVING, 0.002 * tick, &in);
     }
     const double turned = 2.0 * atan2(fabs((double)in.q_WB.y), (double)in.q_WB.w);
     TEST_ASSERT_DOUBLE_WITHIN(0.03, 34.9 * 0.05 + 15.1 * 0.001, turned);
@@ -210,6 +269,7 @@ int main(void)
     RUN_TEST(test_readings_are_the_truth_of_their_instant_and_arrive_after_their_delay);
     RUN_TEST(test_no_sensor_no_reading);
     RUN_TEST(test_noise_offset_rounding_limits_and_losses);
+    RUN_TEST(test_a_further_sensor_is_a_row);
     RUN_TEST(test_a_low_pass_has_its_delay_and_corner);
     RUN_TEST(test_dead_reckoning_follows_the_accelerometer);
     RUN_TEST(test_an_attitude_from_a_clipped_gyro_lags_behind);

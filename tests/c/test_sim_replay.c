@@ -1,13 +1,13 @@
 /// @file test_sim_replay.c
 /// What a landing's core was told, told to a fresh core: the same answers, bit for bit, through the model's own core port.
-#include "sim_replay.h"
+#include "world_replay.h"
 
 #include <string.h>
 
 #include "policy_fixture.h"
 #include "sil.h"
 #include "sim_fixture.h"
-#include "sim_rollout.h"
+#include "world_rollout.h"
 
 enum
 {

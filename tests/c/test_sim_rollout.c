@@ -1,6 +1,6 @@
 /// @file test_sim_rollout.c
 /// Whole landings in C, and the flat interface: starts, ends, outcomes, specs that are none, lanes, threads, time series.
-#include "sim_rollout.h"
+#include "world_rollout.h"
 
 #include "sil.h"
 #include "sim_fixture.h"

@@ -1,6 +1,6 @@
 /// @file test_sim_rotor.c
 /// Rotor lag, decay, mean thrust, saturation, battery, scatter, ceiling effect and inflow against closed forms.
-#include "sim_rotor.h"
+#include "phys_rotor.h"
 
 #include "sim_fixture.h"
 

@@ -1,6 +1,6 @@
 /// @file test_sim_sensors.c
 /// What the flight core is told: when samples are taken and delivered, how noisy they are, what an accelerometer feels.
-#include "sim_sensors.h"
+#include "world_sensors.h"
 
 #include "sim_fixture.h"
 
@@ -17,11 +17,17 @@ static ivl_sim_kin_t moving(double t)
 
 static const double A_MOVING[3] = {0.0, 0.0, 3.0};
 
+static void look(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, const double a_W_mps2[3], double t, ivl_in_t *in)
+{
+    const ivl_sim_scene_t scene = {.model = model, .kin = kin, .a_W_mps2 = {a_W_mps2[0], a_W_mps2[1], a_W_mps2[2]}};
+    ivl_sim_sensors_read(&scene, &RNG, t, &sensors, in);
+}
+
 static ivl_in_t read_at(const ivl_sim_model_t *model, double t)
 {
     const ivl_sim_kin_t kin = moving(t);
     ivl_in_t            in = {.t_us = 0};
-    ivl_sim_sensors_read(model, &RNG, &kin, A_MOVING, t, &sensors, &in);
+    look(model, &kin, A_MOVING, t, &in);
     return in;
 }
 
@@ -198,7 +204,7 @@ static void test_noise_has_the_stated_deviation_on_every_reading(void)
     for (int tick = 0; tick < 10000; tick++)
     {
         ivl_in_t in = {.t_us = 0};
-        ivl_sim_sensors_read(&model, &RNG, &kin, A_NONE, 0.002 * tick, &sensors, &in);
+        look(&model, &kin, A_NONE, 0.002 * tick, &in);
         // the position of a sample is that of its instant: the present one less the motion since
         const double age = 0.002 * tick - pose_time(&in);
         note(&p, (double)in.p_WB_m.y - (2.0 + 0.5 * age));
@@ -227,7 +233,7 @@ static void test_readings_are_the_truth_when_there_is_no_noise(void)
     ivl_in_t              in = {.t_us = 0};
     draw_quat(&draws, kin.q_WB);
     ivl_sim_sensors_init(&model, &RNG, &kin, &sensors);
-    ivl_sim_sensors_read(&model, &RNG, &kin, A_NONE, 0.0, &sensors, &in);
+    look(&model, &kin, A_NONE, 0.0, &in);
     TEST_ASSERT_EQUAL_FLOAT((float)kin.q_WB[0], in.q_WB.x);
     TEST_ASSERT_EQUAL_FLOAT((float)kin.q_WB[3], in.q_WB.w);
     TEST_ASSERT_EQUAL_FLOAT(-2.0f, in.w_B_radps.y);
@@ -244,9 +250,9 @@ static void test_readings_clip_at_full_scale(void)
     ivl_sim_kin_t         kin = {.w_B_radps = {50.0, -50.0, 34.0}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
     ivl_in_t              in = {.t_us = 0};
     ivl_sim_sensors_init(&model, &RNG, &kin, &sensors);
-    ivl_sim_sensors_read(&model, &RNG, &kin, A_NONE, 0.0, &sensors, &in);
+    look(&model, &kin, A_NONE, 0.0, &in);
     kin.v_WB_mps[0] = -1.0;  // within one tick: 500 m/s^2
-    ivl_sim_sensors_read(&model, &RNG, &kin, A_NONE, 0.002, &sensors, &in);
+    look(&model, &kin, A_NONE, 0.002, &in);
     TEST_ASSERT_EQUAL_FLOAT(34.9f, in.w_B_radps.x);
     TEST_ASSERT_EQUAL_FLOAT(-34.9f, in.w_B_radps.y);
     TEST_ASSERT_EQUAL_FLOAT(34.0f, in.w_B_radps.z);
@@ -263,9 +269,9 @@ static ivl_in_t feel(const double q[4], const double dv_mps[3])
     ivl_in_t              in = {.t_us = 0};
     memcpy(kin.q_WB, q, sizeof kin.q_WB);
     ivl_sim_sensors_init(&model, &RNG, &kin, &sensors);
-    ivl_sim_sensors_read(&model, &RNG, &kin, A_NONE, 0.0, &sensors, &in);
+    look(&model, &kin, A_NONE, 0.0, &in);
     memcpy(kin.v_WB_mps, dv_mps, sizeof kin.v_WB_mps);
-    ivl_sim_sensors_read(&model, &RNG, &kin, A_NONE, 0.002, &sensors, &in);
+    look(&model, &kin, A_NONE, 0.002, &in);
     return in;
 }
 

@@ -1,9 +1,9 @@
 /// @file test_sim_step.c
 /// How long a step may be: the limit of stability, what it follows from, and the bound on the work of a motion.
-#include "sim_step.h"
+#include "world_step_size.h"
 
 #include "sim_fixture.h"
-#include "sim_world.h"
+#include "world_group.h"
 
 static const ivl_sim_foot_t FREE[4] = {IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE};
 static const ivl_sim_foot_t ALL_STUCK[4] = {IVL_SIM_FOOT_STUCK, IVL_SIM_FOOT_STUCK, IVL_SIM_FOOT_STUCK, IVL_SIM_FOOT_STUCK};
@@ -173,7 +173,7 @@ static double largest_rise(const ivl_sim_model_t *model, double span_s)
     double least = total_energy(&group), rise = 0.0;
     for (double t = 0.0; t < span_s; t += model->tick_s)
     {
-        ivl_sim_group_advance(&group, model->tick_s);
+        advance(&group, model->tick_s);
         const double energy = total_energy(&group);
         TEST_ASSERT_TRUE(isfinite(energy) && !group.world[0].gave_up);
         rise = fmax(rise, energy - least);
@@ -228,7 +228,7 @@ static double worst_rod(const ivl_sim_model_t *model, double span_s)
     double worst = 0.0;
     for (double t = 0.0; t < span_s; t += model->tick_s)
     {
-        ivl_sim_group_advance(&group, model->tick_s);
+        advance(&group, model->tick_s);
         const ivl_sim_kin_t kin = ivl_sim_world_kin(&group, 0);
         worst = fmax(worst, rod_error(model, &kin));
     }
@@ -276,7 +276,7 @@ static void test_steps_of_four_milliseconds_after_a_contact_are_cut_to_what_the_
     double worst = 0.0;
     for (int i = 0; i < 60; i++)
     {
-        ivl_sim_group_advance(&group, 0.02);
+        advance(&group, 0.02);
         kin = ivl_sim_world_kin(&group, 0);
         worst = fmax(worst, rod_error(&model, &kin));
     }
@@ -349,7 +349,7 @@ static void test_motion_from_any_state_at_all_takes_no_more_evaluations_than_it_
         for (int k = 0; k < 3; k++)
         {
             const uint32_t before = group.world[0].n_evaluation;
-            ivl_sim_group_advance(&group, model.tick_s);
+            advance(&group, model.tick_s);
             TEST_ASSERT_TRUE(ivl_sim_world_ready(&group, 0));
             TEST_ASSERT_TRUE(group.world[0].n_evaluation - before <= ivl_sim_step_evaluations(&model.step, model.tick_s));
         }
@@ -366,15 +366,15 @@ static void test_a_world_that_gave_up_says_so_until_it_is_placed_anew(void)
     model.step.evaluations_at_once = 3.0;
     const ivl_sim_kin_t kin = resting_kin(&model, 0.0, 0.0, 1.0);
     place_alone(&model, &group, &kin, FREE);
-    ivl_sim_group_advance(&group, 0.004);
+    advance(&group, 0.004);
     TEST_ASSERT_FALSE(group.world[0].gave_up);  // one to begin with and two steps
-    ivl_sim_group_advance(&group, 0.008);
+    advance(&group, 0.008);
     TEST_ASSERT_TRUE(group.world[0].gave_up);
     TEST_ASSERT_TRUE(ivl_sim_world_ready(&group, 0));
     TEST_ASSERT_EQUAL_UINT32(6, group.world[0].n_evaluation);
     ivl_sim_world_place(&group, 0, &kin);
     TEST_ASSERT_FALSE(group.world[0].gave_up);
-    ivl_sim_group_advance(&group, 0.004);
+    advance(&group, 0.004);
     TEST_ASSERT_FALSE(group.world[0].gave_up);
 }
 

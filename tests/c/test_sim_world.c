@@ -1,6 +1,6 @@
 /// @file test_sim_world.c
 /// Contact events: what must happen, when, and what must never happen.
-#include "sim_world.h"
+#include "world_group.h"
 
 #include "sim_fixture.h"
 
@@ -15,7 +15,7 @@ static void advance_ticks(double span_s)
 {
     for (int i = 0; i < (int)(span_s / TICK + 0.5); i++)
     {
-        ivl_sim_group_advance(&group, TICK);
+        advance(&group, TICK);
     }
 }
 
@@ -100,7 +100,7 @@ static double deepest(const ivl_sim_model_t *model, double *when_s)
     place_alone(model, &group, &kin, FREE);
     while (t < 0.004)
     {
-        ivl_sim_group_advance(&group, 2.0e-6);
+        advance(&group, 2.0e-6);
         t += 2.0e-6;
         kin = ivl_sim_world_kin(&group, 0);
         *when_s = (gap_of(&kin, 0) < least) ? t : *when_s;
@@ -122,7 +122,7 @@ static void test_a_foot_that_rings_into_the_ceiling_within_one_step_is_not_misse
     {
         ivl_sim_kin_t kin = ringing(&model, dip * i / 100.0);
         place_alone(&model, &group, &kin, FREE);
-        ivl_sim_group_advance(&group, TICK);
+        advance(&group, TICK);
         missed += (group.world[0].foot[0] == IVL_SIM_FOOT_STUCK) ? 0 : 1;
         TEST_ASSERT_TRUE(group.world[0].foot[0] == IVL_SIM_FOOT_STUCK || i > 80);
     }
@@ -132,7 +132,7 @@ static void test_a_foot_that_rings_into_the_ceiling_within_one_step_is_not_misse
     {
         ivl_sim_kin_t kin = ringing(&model, dip * i / 100.0);
         place_alone(&model, &group, &kin, FREE);
-        ivl_sim_group_advance(&group, TICK);
+        advance(&group, TICK);
         TEST_ASSERT_EQUAL(IVL_SIM_FOOT_FREE, group.world[0].foot[0]);
     }
 }
@@ -215,7 +215,7 @@ static void test_stuck_feet_do_not_move_at_all(void)
     place_alone(&model, &group, &start, FREE);
     for (int i = 0; i < 500; i++)
     {
-        ivl_sim_group_advance(&group, TICK);
+        advance(&group, TICK);
         const ivl_sim_kin_t kin = ivl_sim_world_kin(&group, 0);
         for (int leg = 0; leg < 4; leg++)
         {
@@ -249,7 +249,7 @@ static double worst_rod_error(double scale)
         place_alone(&model, &group, &kin, FREE);
         for (int k = 0; k < 100; k++)
         {
-            ivl_sim_group_advance(&group, TICK);
+            advance(&group, TICK);
             const ivl_sim_kin_t now = ivl_sim_world_kin(&group, 0);
             worst = fmax(worst, rod_error(&model, &now));
         }
@@ -279,7 +279,7 @@ static double largest_rise(const ivl_sim_model_t *model, draws_t *draws, double 
         double least = total_energy(&group);
         for (int k = 0; k < 150; k++)
         {
-            ivl_sim_group_advance(&group, TICK);
+            advance(&group, TICK);
             const double energy = total_energy(&group);
             TEST_ASSERT_TRUE(isfinite(energy));
             rise = fmax(rise, energy - least);
@@ -319,7 +319,7 @@ static void test_feet_that_arrive_together_stick_together(void)
     place_alone(&model, &group, &kin, FREE);
     for (int i = 0; i < 100 && !group.world[0].impact.happened; i++)
     {
-        ivl_sim_group_advance(&group, 1.0e-4);
+        advance(&group, 1.0e-4);
     }
     TEST_ASSERT_EQUAL(2, ivl_sim_world_count_stuck(&group.world[0]));
     TEST_ASSERT_EQUAL(IVL_SIM_FOOT_STUCK, group.world[0].foot[0]);
@@ -364,7 +364,7 @@ static double largest_pull(const ivl_sim_model_t *model, double span_s, double l
     *when_s = -1.0;
     while (t < span_s && group.world[0].foot[0] == IVL_SIM_FOOT_STUCK)
     {
-        ivl_sim_group_advance(&group, 1.0e-4);
+        advance(&group, 1.0e-4);
         t += 1.0e-4;
         const double pull = group.last.pull_N[0][0];
         *when_s = (*when_s < 0.0 && pull > limit) ? t : *when_s;
@@ -449,7 +449,7 @@ static void test_a_foot_slides_first_and_sticks_after_the_delay_while_it_presses
     place_alone(&model, &group, &start, FREE);
     for (int i = 0; i < 600; i++)
     {
-        ivl_sim_group_advance(&group, 2.0e-5);
+        advance(&group, 2.0e-5);
         const ivl_sim_world_t *w = &group.world[0];
         const ivl_sim_kin_t    kin = ivl_sim_world_kin(&group, 0);
         if (touched < 0.0 && w->foot[0] == IVL_SIM_FOOT_SLIDING)
@@ -482,7 +482,7 @@ static void test_a_foot_that_does_not_press_for_long_enough_bounces_off(void)
     place_alone(&model, &group, &start, FREE);
     for (int i = 0; i < 150; i++)
     {
-        ivl_sim_group_advance(&group, TICK);
+        advance(&group, TICK);
         slid = slid || group.world[0].foot[0] == IVL_SIM_FOOT_SLIDING;
         TEST_ASSERT_EQUAL(0, ivl_sim_world_count_stuck(&group.world[0]));
     }
@@ -523,7 +523,7 @@ static void test_d_min_is_the_smallest_distance_of_the_origin(void)
     place_alone(&model, &group, &kin, FREE);
     for (int i = 0; i < 2000; i++)
     {
-        ivl_sim_group_advance(&group, 2.0e-4);
+        advance(&group, 2.0e-4);
         least = fmin(least, params.world_ceiling_height_m - ivl_sim_world_kin(&group, 0).p_WB_m[2]);
     }
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, least, group.world[0].d_min_m);

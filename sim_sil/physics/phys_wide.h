@@ -1,0 +1,160 @@
+/// @file phys_wide.h
+/// Numbers, vectors and rotations of several rollouts side by side, one in each lane.  Pure, no state.
+#ifndef IVL_PHYS_WIDE_H
+#define IVL_PHYS_WIDE_H
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "phys_vector.h"
+
+// Vectors are passed by value only between inlined functions, so how the ABI would pass them does not matter.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+// Short loops over matrix elements are written out, so that their indices cost nothing.
+#if defined(__clang__)
+#define IVL_SIM_UNROLL _Pragma("unroll")
+#else
+#define IVL_SIM_UNROLL _Pragma("GCC unroll 16")
+#endif
+
+enum
+{
+    IVL_SIM_LANES = 8  ///< rollouts that are stepped together; a power of two
+};
+
+/// One number of each of several rollouts.  Every operation acts on each lane alone, so a lane's bits do not depend on its
+/// neighbours, and the same source serves registers of any width.
+typedef double  ivl_wide_t __attribute__((vector_size(sizeof(double) * IVL_SIM_LANES)));
+typedef int64_t ivl_mask_t __attribute__((vector_size(sizeof(int64_t) * IVL_SIM_LANES)));  ///< comparison: all bits set, or none
+
+/// The same number in all lanes.
+IVL_SIM_INLINE ivl_wide_t ivl_wide(double a)
+{
+    return a - (ivl_wide_t){0.0};  // exact for any a, -0 and NaN included
+}
+
+IVL_SIM_INLINE ivl_wide_t ivl_wide_sqrt(ivl_wide_t a)
+{
+    ivl_wide_t r;
+    for (int i = 0; i < IVL_SIM_LANES; i++)
+    {
+        r[i] = sqrt(a[i]);
+    }
+    return r;
+}
+
+IVL_SIM_INLINE ivl_wide_t ivl_wide_select(ivl_mask_t m, ivl_wide_t yes, ivl_wide_t no)
+{
+    return (ivl_wide_t)((m & (ivl_mask_t)yes) | (~m & (ivl_mask_t)no));
+}
+
+IVL_SIM_INLINE ivl_wide_t ivl_wide_abs(ivl_wide_t a)
+{
+    return (ivl_wide_t)((ivl_mask_t)a & 0x7fffffffffffffffLL);
+}
+
+IVL_SIM_INLINE bool ivl_mask_any(ivl_mask_t m)
+{
+    int64_t any = 0;
+    for (int i = 0; i < IVL_SIM_LANES; i++)
+    {
+        any |= m[i];
+    }
+    return any != 0;
+}
+
+/// A vector of each of several rollouts.
+typedef struct
+{
+    ivl_wide_t x, y, z;
+} ivl_w3_t;
+
+/// The vector of one rollout.
+IVL_SIM_INLINE ivl_d3_t ivl_w3_lane(const ivl_w3_t *a, int lane)
+{
+    return (ivl_d3_t){a->x[lane], a->y[lane], a->z[lane]};
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_w3_of(ivl_d3_t a)
+{
+    return (ivl_w3_t){ivl_wide(a.x), ivl_wide(a.y), ivl_wide(a.z)};
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_w3_add(ivl_w3_t a, ivl_w3_t b)
+{
+    return (ivl_w3_t){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_w3_sub(ivl_w3_t a, ivl_w3_t b)
+{
+    return (ivl_w3_t){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_w3_scale(ivl_wide_t s, ivl_w3_t a)
+{
+    return (ivl_w3_t){s * a.x, s * a.y, s * a.z};
+}
+
+/// a + s b
+IVL_SIM_INLINE ivl_w3_t ivl_w3_plus(ivl_w3_t a, ivl_wide_t s, ivl_w3_t b)
+{
+    return (ivl_w3_t){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
+}
+
+IVL_SIM_INLINE ivl_wide_t ivl_w3_dot(ivl_w3_t a, ivl_w3_t b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+/// dot and cross product with a vector that is the same in all lanes
+IVL_SIM_INLINE ivl_wide_t ivl_w3_dot_d3(ivl_w3_t a, ivl_d3_t b)
+{
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_w3_cross(ivl_w3_t a, ivl_w3_t b)
+{
+    return (ivl_w3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_w3_cross_d3(ivl_w3_t a, ivl_d3_t b)
+{
+    return (ivl_w3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_w3_cross_from_d3(ivl_d3_t a, ivl_w3_t b)
+{
+    return (ivl_w3_t){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Rotation matrices body to world, by rows.
+typedef struct
+{
+    ivl_w3_t row[3];
+} ivl_wrot_t;
+
+IVL_SIM_INLINE ivl_wrot_t ivl_wrot_from_quat(const ivl_wide_t q[4])
+{
+    const ivl_wide_t x = q[0], y = q[1], z = q[2], w = q[3];
+    const ivl_wide_t s = 2.0 / (x * x + y * y + z * z + w * w);
+    const ivl_wide_t xs = x * s, ys = y * s, zs = z * s;
+    ivl_wrot_t       R;
+    R.row[0] = (ivl_w3_t){1.0 - (y * ys + z * zs), x * ys - w * zs, x * zs + w * ys};
+    R.row[1] = (ivl_w3_t){x * ys + w * zs, 1.0 - (x * xs + z * zs), y * zs - w * xs};
+    R.row[2] = (ivl_w3_t){x * zs - w * ys, y * zs + w * xs, 1.0 - (x * xs + y * ys)};
+    return R;
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_wrot_apply(const ivl_wrot_t *R, ivl_w3_t a)
+{
+    return (ivl_w3_t){ivl_w3_dot(R->row[0], a), ivl_w3_dot(R->row[1], a), ivl_w3_dot(R->row[2], a)};
+}
+
+IVL_SIM_INLINE ivl_w3_t ivl_wrot_apply_inverse(const ivl_wrot_t *R, ivl_w3_t a)
+{
+    return ivl_w3_plus(ivl_w3_plus(ivl_w3_scale(a.x, R->row[0]), a.y, R->row[1]), a.z, R->row[2]);
+}
+
+#endif  // IVL_PHYS_WIDE_H

@@ -1,0 +1,171 @@
+#include "world_group.h"
+
+static const double LEAST_V = 0.01;  // a drawn voltage stays above that of a supply that never sags
+
+void ivl_sim_world_rest_legs(const ivl_sim_model_t *model, ivl_sim_kin_t *kin)
+{
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_d3_t foot_B = ivl_d3_add(model->leg.hip_B_m[i], ivl_d3_scale(model->raw.leg_length_m, model->leg.rest_B[i]));
+        ivl_d3_store(kin->p_foot_W_m[i], ivl_d3_add(ivl_d3_load(kin->p_WB_m), ivl_rot_apply(&R, foot_B)));
+        memcpy(kin->v_foot_W_mps[i], kin->v_WB_mps, sizeof kin->v_WB_mps);
+    }
+}
+
+static void draw_scatter(ivl_sim_world_t *w)
+{
+    const double sigma = w->model->raw.rotor_thrust_scatter_norm;
+    if (sigma > 0.0)
+    {
+        double n[4];
+        ivl_sim_normal4(&w->rng, IVL_SIM_DRAW_THRUST, 0, n);
+        for (int i = 0; i < IVL_SIM_MOTORS; i++)
+        {
+            const double factor = 1.0 + sigma * n[i];
+            w->rotor.scatter[i] = (factor > 0.0) ? factor : 0.0;
+        }
+    }
+}
+
+/// Open-circuit voltage of this rollout: the one given, or drawn about the model's.
+static void draw_battery(ivl_sim_world_t *w, double battery_V)
+{
+    const ivl_sim_params_t *raw = &w->model->raw;
+    if (battery_V > 0.0)
+    {
+        w->rotor.open_circuit_V = battery_V;
+    }
+    else if (raw->battery_voltage_V > 0.0 && raw->battery_voltage_scatter_V > 0.0)
+    {
+        double n[4];
+        ivl_sim_normal4(&w->rng, IVL_SIM_DRAW_BATTERY, 0, n);
+        const double drawn = raw->battery_voltage_V + raw->battery_voltage_scatter_V * n[0];
+        w->rotor.open_circuit_V = (drawn > LEAST_V) ? drawn : LEAST_V;
+    }
+}
+
+void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group)
+{
+    const ivl_sim_foot_t free_feet[IVL_SIM_LEGS] = {IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE};
+    memset(group, 0, sizeof *group);
+    group->model = model;
+    ivl_sim_kin_t resting;
+    memset(&resting, 0, sizeof resting);
+    resting.q_WB[3] = 1.0;
+    ivl_sim_world_rest_legs(model, &resting);
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        // an empty lane is computed along with the others: it must hold numbers
+        ivl_sim_lane_set(&group->state, lane, &resting);
+        ivl_sim_contact_set(model, &group->contact, lane, free_feet);
+    }
+}
+
+void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *kin)
+{
+    ivl_sim_world_t *w = &group->world[lane];
+    ivl_sim_lane_set(&group->state, lane, kin);
+    w->restart = true;
+    w->gave_up = false;
+    w->d_min_m = w->model->raw.world_ceiling_height_m - kin->p_WB_m[2];
+}
+
+ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_kin_t kin;
+    ivl_sim_lane_get(&group->state, lane, &kin);
+    return kin;
+}
+
+void ivl_sim_world_start(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const double p_W_m[3], const double v_W_mps[3])
+{
+    ivl_sim_start_state_t start;
+    memset(&start, 0, sizeof start);
+    memcpy(start.p_W_m, p_W_m, sizeof start.p_W_m);
+    memcpy(start.v_W_mps, v_W_mps, sizeof start.v_W_mps);
+    start.q_WB[3] = 1.0;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        start.rotor_radps[i] = group->model->rotor_speed_hover_radps;
+    }
+    ivl_sim_world_start_from(group, lane, rng, &start);
+}
+
+/// Nose-up pitch of an attitude, within half a turn: the branch on which the integral of the rate begins.
+static double nose_up_of(const double q_WB[4])
+{
+    const ivl_rot_t R = ivl_rot_from_quat(q_WB);
+    return ivl_sim_atan2(R.row[2].x, R.row[0].x);
+}
+
+/// A start that turns: the feet go along as points of the body.
+static void turn_legs(ivl_sim_kin_t *kin)
+{
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    const ivl_d3_t  rate_W = ivl_rot_apply(&R, ivl_d3_load(kin->w_B_radps));
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const ivl_d3_t arm = ivl_d3_sub(ivl_d3_load(kin->p_foot_W_m[i]), ivl_d3_load(kin->p_WB_m));
+        ivl_d3_store(kin->v_foot_W_mps[i], ivl_d3_add(ivl_d3_load(kin->v_WB_mps), ivl_d3_cross(rate_W, arm)));
+    }
+}
+
+void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const ivl_sim_start_state_t *start)
+{
+    const ivl_sim_model_t *model = group->model;
+    ivl_sim_world_t       *w = &group->world[lane];
+    ivl_sim_kin_t          kin;
+    memset(&kin, 0, sizeof kin);
+    memcpy(kin.p_WB_m, start->p_W_m, sizeof kin.p_WB_m);
+    memcpy(kin.v_WB_mps, start->v_W_mps, sizeof kin.v_WB_mps);
+    memcpy(kin.q_WB, start->q_WB, sizeof kin.q_WB);
+    memcpy(kin.w_B_radps, start->w_B_radps, sizeof kin.w_B_radps);
+    kin.pitch_rad = nose_up_of(kin.q_WB);
+    ivl_sim_world_rest_legs(model, &kin);
+    turn_legs(&kin);
+    memset(w, 0, sizeof *w);
+    w->model = model;
+    w->rng = *rng;
+    w->graded_s = model->raw.step_flight_s * model->raw.step_scale_norm;
+    w->step_s = w->graded_s;
+    ivl_sim_contact_set(model, &group->contact, lane, w->foot);
+    ivl_sim_rotor_init(model, &w->rotor);
+    memcpy(w->rotor.speed_radps, start->rotor_radps, sizeof w->rotor.speed_radps);
+    memcpy(w->rotor.command_radps, start->rotor_radps, sizeof w->rotor.command_radps);
+    draw_scatter(w);
+    draw_battery(w, start->battery_V);
+    ivl_sim_sensors_init(model, rng, &kin, &w->sensors);
+    model->core.init(group->port, lane, &model->firmware, &w->firmware);
+    // accelerations of the vehicle that was in this lane before must not reach the new one: what is no number would, even
+    // through a step of no length
+    ivl_sim_rate_lane_clear(&group->last, lane);
+    ivl_sim_world_place(group, lane, &kin);
+    group->active[lane] = true;
+}
+
+void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t   *w = &group->world[lane];
+    ivl_sim_sensors_t *s = &w->sensors;
+    const double       past_s = w->t_s;
+    s->next_s -= past_s;
+    s->held.t_s -= past_s;
+    for (int i = 0; i < IVL_SIM_POSE_QUEUE; i++)
+    {
+        s->queue[i].t_s -= past_s;
+    }
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        w->t_touch_s[i] -= past_s;
+        w->stuck_order[i] = 0;
+    }
+    w->t_s = 0.0;
+    w->n_tick = 1;
+    w->n_step = 0;
+    w->n_evaluation = 0;
+    w->n_order = 0;
+    w->impact = (ivl_sim_impact_t){.happened = false};
+    memset(w->plate_touched, 0, sizeof w->plate_touched);
+    w->d_min_m = w->model->raw.world_ceiling_height_m - group->state.p_WB_m.z[lane];
+}
