@@ -717,6 +717,20 @@ static void body_of(const ivl_sim_state_t *s, int lane, ivl_sim_kin_t *kin)
     }
 }
 
+static void fly(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t       *w = &group->world[lane];
+    const ivl_sim_model_t *model = w->model;
+    if (model->core.has_autopilot)
+    {
+        model->core.step(group->port, lane, &model->firmware, &w->firmware, &w->in, &w->out);
+    }
+    else
+    {
+        ivl_sim_autopilot_step(model, group->port, lane, &w->in, &w->autopilot, &w->firmware, &w->out);
+    }
+}
+
 void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t       *w = &group->world[lane];
@@ -731,7 +745,7 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
         body_of(&group->state, lane, &kin);
         const double a[3] = {group->last.a_WB_mps2.x[lane], group->last.a_WB_mps2.y[lane], group->last.a_WB_mps2.z[lane]};
         ivl_sim_sensors_read(model, &w->rng, &kin, a, w->t_s, &w->sensors, &w->in);
-        model->core.step(group->port, lane, &model->firmware, &w->firmware, &w->in, &w->out);
+        fly(group, lane);
         ivl_sim_rotor_command(model, &w->rotor, w->out.thrust_N);
         const bool approaches = w->firmware.phase == IVL_PHASE_APPROACH;
         w->n_approach_tick += approaches ? 1 : 0;
