@@ -181,6 +181,11 @@ static void test_a_range_is_a_new_reading_when_its_millimetres_change(void)
     tick(&in, 500.0);
     TEST_ASSERT_EQUAL_UINT64(1004000u, seen.range.t_us);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 1.001f, seen.range.value);
+    in.t_us = 1006000u;
+    in.range.value = 0.5f;
+    tick(&in, 500.0);
+    TEST_ASSERT_EQUAL_UINT64(1006000u, seen.range.t_us);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.5f, seen.range.value);
 }
 
 static void test_motor_thrusts_are_those_of_the_motors(void)
