@@ -9,7 +9,7 @@
 /// Packets have their own type as number (ivl_wire.h); these follow behind them.
 enum
 {
-    IVL_SIL_LAYOUT_RECORD_HEADER = 0x100,  ///< 32 bytes
+    IVL_SIL_LAYOUT_RECORD_HEADER = 0x100,  ///< of the flight recorder
     IVL_SIL_LAYOUT_RECORD_ROW = 0x101,     ///< `dflt` is the number of counts for one `unit`
     IVL_SIL_LAYOUT_CONFIG = 0x102,         ///< ivl_cfg_t: names "group.name" of the vehicle's parameters, with their ranges and defaults
     IVL_SIL_LAYOUT_LOGS = 0x103            ///< names and types of the vehicle's log variables; no record, offsets are 0

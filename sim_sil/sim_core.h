@@ -16,6 +16,9 @@ typedef struct
     ivl_status_t (*commit)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy);
     void (*step)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out);
     bool every_tick;  ///< false: ticks are left out while the core's motors are latched off, when they decide nothing
+    /// True: there is an autopilot around the core, which gets what the sensors say and drives the motors.  False: the world takes its place
+    /// (sim_autopilot.h).
+    bool has_autopilot;
 } ivl_sim_core_t;
 
 /// The core that is linked with the simulator; its port is NULL.

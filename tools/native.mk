@@ -38,14 +38,14 @@ LTO_LINK_release := -flto=auto
 endif
 
 # further flags of a folder, and of a single object by its name without folder and suffix
-# the simulator passes vectors by value, within one compilation only: the note that their ABI once changed is idle
-FLAGS_sim_sil := -Wno-psabi
+# the simulator passes vectors by value, within one compilation only: the note that their ABI once changed is idle; it has the app's senses
+FLAGS_sim_sil := -Wno-psabi -Ifirmware/app -isystem firmware/sdk
 FLAGS_sim_sil/physics := $(FLAGS_sim_sil)
 FLAGS_sim_sil/world := $(FLAGS_sim_sil)
 FLAGS_sim_sil/pil := $(FLAGS_sim_sil) -Ifirmware/stm32f405
 
 # the software vehicle: the app's own sources, with the vehicle in the place of its SDK
-FLAGS_vehicle      := $(FLAGS_sim_sil) -DSDK_ON_HOST -Isim_sil/cf -Ifirmware/app -isystem sim_sil/cf/sdk -isystem firmware/sdk
+FLAGS_vehicle      := -isystem sim_sil/cf/sdk $(FLAGS_sim_sil) -DSDK_ON_HOST -Isim_sil/cf
 FLAGS_sim_sil/cf   := $(FLAGS_vehicle)
 FLAGS_firmware/app := $(FLAGS_vehicle)
 
@@ -74,8 +74,9 @@ endif
 
 BUILD   := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
-SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c))
-CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out %/app_controller.c %/app_cpx.c,$(wildcard firmware/app/*.c)))
+SENSES  := firmware/app/app_senses.c
+SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES))
+CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
 LIBRARY := host/ivl/_native/libivl_sil.so

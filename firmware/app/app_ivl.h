@@ -9,8 +9,8 @@
 #define APP_IVL_H
 #include <stdatomic.h>
 
-#include "ivl.h"
-#include "ivl_attitude.h"
+#include "app_port.h"
+#include "app_senses.h"
 #include "ivl_handover.h"
 #include "ivl_parts.h"
 #include "ivl_record.h"
@@ -78,6 +78,8 @@ typedef struct
 /// Written by the stabilizer's task alone, unless a line says otherwise; others may read single numbers for logs.
 typedef struct
 {
+    bool booted;
+
     // the core
     ivl_cfg_t      cfg;
     ivl_state_t    state;
@@ -86,18 +88,14 @@ typedef struct
     ivl_recorder_t recorder;
 
     // what is sensed
-    ivl_attitude_t attitude;
-    ivl_vec3_t     p_seen_W_m;       ///< position of the last call
-    uint64_t       t_pose_us;        ///< when it last changed
-    uint64_t       t_link_us;        ///< when the link was last up
-    uint64_t       t_host_us;        ///< when the host last sent a command
-    bool           has_host;         ///< it ever did
-    _Atomic float  p_sigma_m;        ///< written by the app's task
-    _Atomic float  range_mm;         ///< of the ranging sensor that faces up, 0 without one; written by the app's task
-    float          range_seen_mm;    ///< of the last call
-    app_seen_t     seen;             ///< by a camera, of the latest sampling instant; zero without one
-    atomic_bool    motors_bypassed;  ///< written by the app's task
-    bool           configured;       ///< a configuration was put in force since the start
+    app_senses_t  senses;
+    uint64_t      t_link_us;        ///< when the link was last up
+    uint64_t      t_host_us;        ///< when the host last sent a command
+    bool          has_host;         ///< it ever did
+    _Atomic float p_sigma_m;        ///< written by the app's task
+    app_seen_t    seen;             ///< by a camera, of the latest sampling instant; zero without one
+    atomic_bool   motors_bypassed;  ///< written by the app's task
+    bool          configured;       ///< a configuration was put in force since the start
 
     // who drives the motors
     app_owner_t    owner;
@@ -128,6 +126,9 @@ extern app_t ivl_app;
 
 // ---- the stabilizer's task, in every port (app_tick.c)
 
+/// Once after power-on, with app->cfg as it was flashed and the rest of the memory zero.
+void app_ready(app_t *app);
+
 /// Start or restart the core.  After a restart in the air, motors stay with it, and off, until the vehicle has rested.
 void app_start_core(app_t *app);
 
@@ -148,17 +149,7 @@ float app_fade_into_core(app_t *app, float mean_norm, float loop_s);
 /// The stock controller drives in this call: its thrust, with what fades; none stays none.
 float app_fade_into_stock(app_t *app, float norm, float loop_s);
 
-// ---- asked of the port
-
-/// True if the stabilizer can run the core at this rate.
-bool app_has_rate(float tick_hz);
-
-// ---- the app's task (app_main.c)
-
-void app_task_start(void);
-
-/// Wait for a packet, for a few milliseconds at most, and do what is to be done.
-void app_task_once(void);
+// ---- between tasks
 
 /// Fill a mailbox if it is empty.  @return true if it was
 #define app_put(box, what) (atomic_load(&(box)->full) ? false : ((box)->value = (what), atomic_store(&(box)->full, true), true))

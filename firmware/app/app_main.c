@@ -23,7 +23,6 @@ static const float SETTLE_S = 0.5f;
 typedef struct
 {
     logVarId_t   variance[3];  ///< of the position, m^2
-    logVarId_t   range_up;     ///< mm
     paramVarId_t bypass;
     ivl_phase_t  last_phase;
 } main_t;
@@ -39,7 +38,6 @@ static float variance_m2(logVarId_t id)
 static void look_up(app_t *app, const main_t *m)
 {
     atomic_store(&app->p_sigma_m, app_sigma_m(variance_m2(m->variance[0]), variance_m2(m->variance[1]), variance_m2(m->variance[2])));
-    atomic_store(&app->range_mm, logVarIdIsValid(m->range_up) ? logGetFloat(m->range_up) : 0.0f);
     atomic_store(&app->motors_bypassed, !PARAM_VARID_IS_VALID(m->bypass) || (paramGetUint(m->bypass) != 0u));
 }
 
@@ -78,7 +76,6 @@ void app_task_start(void)
 {
     task = (main_t){
         .variance = {logGetVarId("kalman", "varPX"), logGetVarId("kalman", "varPY"), logGetVarId("kalman", "varPZ")},
-        .range_up = logGetVarId("range", "up"),
         .bypass = paramGetVarId("motorPowerSet", "enable"),
     };
     app_tumble_check_set(IVL_PHASE_IDLE);

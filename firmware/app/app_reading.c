@@ -47,26 +47,30 @@ void app_reading_put(app_t *app, app_camera_t camera, const ivl_wire_reading_t *
     atomic_fetch_add(&app->n_reading_bad, 1u);
 }
 
+// unless it was sampled before what is kept
+static void keep(ivl_reading_t *kept, const ivl_reading_t *told)
+{
+    if (told->t_us > kept->t_us)
+    {
+        *kept = *told;
+    }
+}
+
 void app_reading_take(app_t *app)
 {
     for (int camera = 0; camera < APP_CAMERAS; camera++)
     {
         app_seen_t seen;
-        if (app_take(&app->seen_in[camera], &seen) && (seen.rrev.t_us > app->seen.rrev.t_us))
+        if (app_take(&app->seen_in[camera], &seen))
         {
-            app->seen = seen;
+            keep(&app->seen.rrev, &seen.rrev);
+            keep(&app->seen.flow, &seen.flow);
         }
     }
 }
 
 void app_reading_show(app_t *app)
 {
-    if (app->seen.rrev.t_us > app->in.rrev.t_us)
-    {
-        app->in.rrev = app->seen.rrev;
-    }
-    if (app->seen.flow.t_us > app->in.flow.t_us)
-    {
-        app->in.flow = app->seen.flow;
-    }
+    keep(&app->in.rrev, &app->seen.rrev);
+    keep(&app->in.flow, &app->seen.flow);
 }

@@ -10,6 +10,32 @@
 
 app_t ivl_app;
 
+// ---- start
+
+static void register_with_sdk(void)
+{
+    // the SDK remembers what a vehicle without power would have forgotten
+    static bool is_registered;
+    if (!is_registered)
+    {
+        is_registered = true;
+        app_memory_register();
+#ifdef CONFIG_ENABLE_CPX
+        app_cpx_start();
+#endif
+    }
+}
+
+void app_ready(app_t *app)
+{
+    app->booted = true;
+    app->staged = app->cfg;
+    app->config_crc = ivl_cfg_crc(&app->cfg);
+    app->config_result.bad = (uint8_t)APP_CONFIG_NONE;
+    ivl_record_init(&app->recorder);
+    register_with_sdk();
+}
+
 void app_start_core(app_t *app)
 {
     // a second start comes from switching controllers: what was in the air then may be anywhere now
@@ -19,8 +45,10 @@ void app_start_core(app_t *app)
     app->in.cmd.request = IVL_REQUEST_IDLE;
     app->out = (ivl_out_t){.stock_allowed = !was_active};
     app->owner = was_active ? APP_OWNER_CORE : APP_OWNER_STOCK;
-    app->attitude = (ivl_attitude_t){.q_WB = {0.0f, 0.0f, 0.0f, 1.0f}};
+    app->senses = (app_senses_t){.has_pose = false};
 }
+
+// ---- each call
 
 void app_take_requests(app_t *app, uint64_t now_us)
 {

@@ -7,6 +7,7 @@
 
 #include "app_convert.h"
 #include "cf_vehicle.h"
+#include "controller.h"
 
 ivl_cf_t ivl_cf_the;
 
@@ -46,7 +47,6 @@ static void boot_settings(ivl_cf_t *cf)
         .ext_pos_sigma_m = 0.01f,
         .ext_quat_sigma_rad = 4.5e-3f,
         .deck = 1,
-        .selftest_passed = 1,
     };
 }
 
@@ -55,14 +55,9 @@ static void boot_app(ivl_cf_t *cf)
 {
     const ivl_cfg_t *cfg = &cf->model.firmware;
     ivl_cf_platform = (ivl_cf_platform_t){cfg->arm_x_m / APP_SQRT_HALF, cfg->mass_kg, cfg->motor_thrust_N_max, cfg->torque_per_thrust_m};
-    memset(&ivl_app, 0, sizeof ivl_app);
-    ivl_app.cfg = *cfg;
-    ivl_app.staged = *cfg;
-    ivl_app.config_crc = ivl_cfg_crc(cfg);
-    ivl_app.config_result.bad = (uint8_t)APP_CONFIG_NONE;
-    ivl_record_init(&ivl_app.recorder);
-    app_memory_register();
-    app_start_core(&ivl_app);
+    app_boot(cfg);
+    controllerOutOfTreeInit();
+    cf->set.selftest_passed = controllerOutOfTreeTest() ? 1 : 0;
     app_task_start();
 }
 
@@ -89,7 +84,9 @@ ivl_cf_t *ivl_cf_open(const ivl_sim_model_t *model, uint64_t seed, char *error, 
     cf->to_app.most = IVL_CF_PACKETS_IN_MAX;
     cf->from_app.most = IVL_CF_PACKETS_MAX;
     cf->acc_share = (float)(1.0 - ivl_sim_exp(-2.0 * IVL_SIM_PI * (double)ACC_FILTER_HZ * model->tick_s));
+    cf->has_range = model->raw.range_rate_hz > 0.0;
     cf->range_up_mm = RANGE_NONE_MM;
+    cf->state.attitudeQuaternion.w = 1.0f;
     boot_settings(cf);
     ivl_cf_supervisor_init(&cf->supervisor);
     ivl_cf_commander_init(&cf->commander);
@@ -119,7 +116,7 @@ void ivl_cf_close(ivl_cf_t *cf)
 
 static void run_app(ivl_cf_t *cf)
 {
-    if (cf->to_app.n > 0 || app_packets_waiting(&ivl_app) || cf->t_ms >= cf->app_wake_ms)
+    if (cf->to_app.n > 0 || app_task_is_pressed() || cf->t_ms >= cf->app_wake_ms)
     {
         app_task_once();
     }
@@ -190,17 +187,17 @@ void ivl_cf_step(ivl_cf_t *cf)
     {
         supervise(cf);
     }
-    if (cf->t_ms % RANGE_MS == 0)
+    if (!cf->has_range && cf->t_ms % RANGE_MS == 0)
     {
         look_up(cf);
-    }
-    if (cf->set.controller == IVL_CF_CONTROLLER_APP)
-    {
-        app_take_requests(&ivl_app, ivl_cf_time_us(cf));
     }
     if (cf->t_ms % cf->tick_ms == 0)
     {
         ivl_cf_world_tick(cf);
+    }
+    else
+    {
+        ivl_cf_stabilize(cf);
     }
 }
 

@@ -4,6 +4,7 @@
 
 #include "app_convert.h"
 #include "cf_vehicle.h"
+#include "ivl_wire.h"
 
 /// The parameter, if it is what the command's float was made from; else the float.
 static double exact(double parameter, float from_parameter, float commanded)
@@ -23,8 +24,8 @@ static uint64_t stream_of(const ivl_cf_settings_t *set)
 
 static ivl_sim_spec_t spec_of(const ivl_cf_settings_t *set)
 {
-    const ivl_command_t *cmd = &ivl_app.in.cmd;
-    const ivl_policy_t  *policy = &ivl_app.state.policy;
+    const ivl_command_t *cmd = app_command();
+    const ivl_policy_t  *policy = &app_core_state()->policy;
     const float          angle_rad = (float)(set->angle_deg * (IVL_SIM_PI / 180.0));
     ivl_sim_spec_t       spec = {
         .speed_mps = {exact(set->speed_mps, (float)set->speed_mps, cmd->speed_mps)},
@@ -71,7 +72,7 @@ void ivl_cf_episode_begin(ivl_cf_t *cf)
     e->number++;
     e->running = true;
     e->ended = 0;
-    e->policy_seq = ivl_app.state.policy.id.seq;
+    e->policy_seq = app_core_state()->policy.id.seq;
     e->draws[0] = seed_of(&cf->set);
     e->draws[1] = stream_of(&cf->set);
     ivl_sim_outcome_clear(&e->now);

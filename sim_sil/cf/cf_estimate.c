@@ -38,7 +38,7 @@ void ivl_cf_estimate_packet(ivl_cf_estimate_t *e, uint64_t now_us, ivl_vec3_t p_
     }
 }
 
-void ivl_cf_estimate_fill(ivl_cf_estimate_t *e, bool follow, float dt_s, ivl_in_t *in)
+void ivl_cf_estimate_fill(ivl_cf_estimate_t *e, float dt_s, ivl_in_t *in)
 {
     if (!e->has_position)
     {
@@ -50,7 +50,7 @@ void ivl_cf_estimate_fill(ivl_cf_estimate_t *e, bool follow, float dt_s, ivl_in_
     in->v_WB_mps = (in->t_us - e->t_us > GAP_US) ? ivl_vec3(0.0f, 0.0f, 0.0f) : e->v_W_mps;
     if (e->has_attitude)
     {
-        ivl_attitude_update(&e->attitude, e->q_WB, follow, in->w_B_radps, dt_s);
+        ivl_attitude_update(&e->attitude, e->q_WB, true, in->w_B_radps, dt_s);
         in->q_WB = e->attitude.q_WB;
     }
 }

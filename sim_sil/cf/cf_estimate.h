@@ -24,7 +24,6 @@ void ivl_cf_estimate_packet(ivl_cf_estimate_t *e, uint64_t now_us, ivl_vec3_t p_
 
 /// Replaces position, velocity, their age, and with poses the attitude, by what has arrived; before the first packet the sample stays and grows
 /// as old as the vehicle.  Once a tick.
-/// @param[in] follow  false: attitude from the gyro alone
-void ivl_cf_estimate_fill(ivl_cf_estimate_t *e, bool follow, float dt_s, ivl_in_t *in);
+void ivl_cf_estimate_fill(ivl_cf_estimate_t *e, float dt_s, ivl_in_t *in);
 
 #endif  // IVL_CF_ESTIMATE_H

@@ -16,6 +16,7 @@
 #include "param.h"
 #include "platform_defaults.h"
 #include "pm.h"
+#include "range.h"
 #include "supervisor.h"
 #include "task.h"
 #include "usec_time.h"
@@ -73,7 +74,13 @@ void commanderRelaxPriority(void)
     ivl_cf_relax(&ivl_cf_the);
 }
 
-/// The core runs with the world's ticks.
+/// Only where the world has such a sensor: in the process of the host there is no other.
+float rangeGet(rangeDirection_t direction)
+{
+    return (direction == rangeUp && ivl_cf_the.has_range) ? (float)ivl_cf_the.range_up_mm : 0.0f;
+}
+
+/// The world's alone: its sensors and motors know no other.
 bool app_has_rate(float tick_hz)
 {
     return tick_hz >= ivl_cf_the.model.firmware.tick_hz && tick_hz <= ivl_cf_the.model.firmware.tick_hz;

@@ -1,6 +1,7 @@
 /// @file cf_tables.c
 /// Parameters and log variables that are served: those of the stock firmware that are modelled, those of the simulator, and the app's own.
 #include "cf_vehicle.h"
+#include "controller.h"
 #include "log.h"
 #include "param.h"
 
@@ -59,7 +60,7 @@ static void controller_written(void)
         THE.set.controller = IVL_CF_CONTROLLER_APP;
         if (was_stock)
         {
-            app_start_core(&ivl_app);
+            controllerOutOfTreeInit();
         }
     }
     ivl_cf_stock_reset(&THE.stock);
@@ -165,7 +166,7 @@ static const ivl_cf_param_t PARAMS[] = {
 };
 // clang-format on
 
-// ---- log variables: X(c type, group, name, value), with the vehicle cf, its input in, its attitude e and the truth kin
+// ---- log variables: X(c type, group, name, value), with the vehicle cf, its input in, what follows from it e and the truth kin
 
 // clang-format off
 #define LOGS(X) \
@@ -183,20 +184,20 @@ static const ivl_cf_param_t PARAMS[] = {
     X(float, "stateEstimate", "ax", ax, e.a_g.x) \
     X(float, "stateEstimate", "ay", ay, e.a_g.y) \
     X(float, "stateEstimate", "az", az, e.a_g.z) \
-    X(float, "stateEstimate", "roll",  roll,  e.roll_deg) \
-    X(float, "stateEstimate", "pitch", pitch, e.pitch_deg) \
-    X(float, "stateEstimate", "yaw",   yaw,   e.yaw_deg) \
+    X(float, "stateEstimate", "roll",  roll,  cf->state.attitude.roll) \
+    X(float, "stateEstimate", "pitch", pitch, cf->state.attitude.pitch) \
+    X(float, "stateEstimate", "yaw",   yaw,   cf->state.attitude.yaw) \
     X(float, "stateEstimate", "qx", qx, in->q_WB.x) \
     X(float, "stateEstimate", "qy", qy, in->q_WB.y) \
     X(float, "stateEstimate", "qz", qz, in->q_WB.z) \
     X(float, "stateEstimate", "qw", qw, in->q_WB.w) \
-    X(float, "stabilizer", "roll",  s_roll,  e.roll_deg) \
-    X(float, "stabilizer", "pitch", s_pitch, e.pitch_deg) \
-    X(float, "stabilizer", "yaw",   s_yaw,   e.yaw_deg) \
+    X(float, "stabilizer", "roll",  s_roll,  cf->state.attitude.roll) \
+    X(float, "stabilizer", "pitch", s_pitch, cf->state.attitude.pitch) \
+    X(float, "stabilizer", "yaw",   s_yaw,   cf->state.attitude.yaw) \
     X(float, "stabilizer", "thrust", s_thrust, 0.25f * (e.pwm[0] + e.pwm[1] + e.pwm[2] + e.pwm[3])) \
-    X(float, "gyro", "x", gyro_x, in->w_B_radps.x * DEG_PER_RAD) \
-    X(float, "gyro", "y", gyro_y, in->w_B_radps.y * DEG_PER_RAD) \
-    X(float, "gyro", "z", gyro_z, in->w_B_radps.z * DEG_PER_RAD) \
+    X(float, "gyro", "x", gyro_x, cf->sensors.gyro.x) \
+    X(float, "gyro", "y", gyro_y, cf->sensors.gyro.y) \
+    X(float, "gyro", "z", gyro_z, cf->sensors.gyro.z) \
     X(float, "acc", "x", acc_x, cf->acc_g[0]) \
     X(float, "acc", "y", acc_y, cf->acc_g[1]) \
     X(float, "acc", "z", acc_z, cf->acc_g[2]) \
@@ -229,7 +230,6 @@ static const ivl_cf_param_t PARAMS[] = {
     X(uint8_t, "simTruth", "feet", true_feet, (uint8_t)ivl_sim_world_count_stuck(&cf->group.world[IVL_CF_LANE]))
 // clang-format on
 
-static const float DEG_PER_RAD = 57.2957795f;
 static const float PWM_FULL = 65535.0f;
 
 #define MEMBER(c_type, group, name, member, value) c_type member;
@@ -256,22 +256,15 @@ static const ivl_cf_log_t LOG_TABLE[] = {
 
 typedef struct
 {
-    float      roll_deg, pitch_deg, yaw_deg;  ///< pitch with the sign of the firmware, nose up
-    ivl_vec3_t a_g;                           ///< acceleration in W, gravity removed
+    ivl_vec3_t a_g;  ///< acceleration in W, gravity removed
     float      pwm[4];
 } derived_t;
 
 static derived_t derive(const ivl_cf_t *cf)
 {
-    const ivl_in_t  *in = &cf->sensed;
-    const ivl_axes_t r = ivl_axes_of(in->q_WB);
-    const double     sin_pitch = -(double)r.x.z, rest = 1.0 - sin_pitch * sin_pitch;
-    derived_t        e = {
-        .roll_deg = (float)ivl_sim_atan2((double)r.y.z, (double)r.z.z) * DEG_PER_RAD,
-        .pitch_deg = -(float)ivl_sim_atan2(sin_pitch, sqrt((rest > 0.0) ? rest : 0.0)) * DEG_PER_RAD,
-        .yaw_deg = (float)ivl_sim_atan2((double)r.x.y, (double)r.x.x) * DEG_PER_RAD,
-    };
-    const float *a = cf->acc_g;
+    const ivl_axes_t r = ivl_axes_of(cf->sensed.q_WB);
+    derived_t        e;
+    const float     *a = cf->acc_g;
     e.a_g = ivl_add(ivl_scale(r.x, a[0]), ivl_add(ivl_scale(r.y, a[1]), ivl_scale(r.z, a[2])));
     e.a_g.z -= 1.0f;
     for (int i = 0; i < 4; i++)

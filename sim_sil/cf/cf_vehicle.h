@@ -2,7 +2,7 @@
 /// The vehicle's memory, and what its files ask of each other.  The server sees cf.h alone.
 #ifndef IVL_CF_VEHICLE_H
 #define IVL_CF_VEHICLE_H
-#include "app_ivl.h"
+#include "app_port.h"
 #include "cf.h"
 #include "cf_estimate.h"
 #include "cf_planner.h"
@@ -10,6 +10,7 @@
 #include "cf_queue.h"
 #include "cf_stock.h"
 #include "cf_supervisor.h"
+#include "sim_autopilot.h"
 
 enum
 {
@@ -79,12 +80,18 @@ struct ivl_cf
     ivl_cf_estimate_t   estimate;
     ivl_cf_power_t      power;
     ivl_cf_episode_t    episode;
-    ivl_in_t            sensed;      ///< of the last tick, in vehicle time
+    ivl_in_t            sensed;  ///< of the last tick, in vehicle time
+    ivl_sim_told_t      told;
+    sensorData_t        sensors;  ///< what the SDK hands round since the last tick
+    state_t             state;
+    ivl_cf_setpoint_t   setpoint;  ///< of the last call of the controller
+    control_t           control, stock_control;
     float               acc_share;   ///< of the filter, a tick
     float               acc_g[3];    ///< filtered
     float               motor_N[4];  ///< commands of the last tick
     float               variance_m2;
-    uint16_t            range_up_mm;
+    bool                has_range;    ///< the world has a ranging sensor
+    uint16_t            range_up_mm;  ///< its last reading, or what one would say
     ivl_cf_text_t       text;
     ivl_cf_packets_t    to_app, from_app;
     size_t              changed[IVL_CF_CHANGED_MAX];
@@ -104,10 +111,18 @@ static inline ivl_sim_world_t *ivl_cf_world(ivl_cf_t *cf)
     return &cf->group.world[IVL_CF_LANE];
 }
 
+// ---- cf_senses.c
+
+/// Sensors and estimator have a tick of the world.
+void ivl_cf_sense(ivl_cf_t *cf, const ivl_in_t *in);
+
 // ---- cf_stabilizer.c
 
 /// Where the world's core runs: the app, or the stock controller.
 extern const ivl_sim_core_t ivl_cf_core;
+
+/// One call of the controller, between two ticks of the world.
+void ivl_cf_stabilize(ivl_cf_t *cf);
 
 // ---- cf_world.c
 

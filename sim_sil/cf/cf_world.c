@@ -40,18 +40,6 @@ void ivl_cf_world_boot(ivl_cf_t *cf)
     memset(ivl_cf_world(cf)->rotor.speed_radps, 0, sizeof ivl_cf_world(cf)->rotor.speed_radps);
 }
 
-static void forget_requests(app_t *app)
-{
-    atomic_store(&app->command_in.full, false);
-    app->in.cmd = (ivl_command_t){.request = IVL_REQUEST_IDLE};
-    if (app->pending.what == APP_WAITS_FOR_COMMAND)
-    {
-        app->pending.what = APP_WAITS_FOR_NOTHING;
-    }
-    atomic_store(&app->was_handed_back, false);
-    app->owner = APP_OWNER_STOCK;
-}
-
 void ivl_cf_world_reset(ivl_cf_t *cf)
 {
     const uint32_t   now_ms = ivl_cf_now_ms(cf);
@@ -59,7 +47,6 @@ void ivl_cf_world_reset(ivl_cf_t *cf)
     cf->episode.running = false;
     cf->episode.ended = 0;
     start(cf, (double)cf->set.start_z_m);
-    forget_requests(&ivl_app);
     ivl_cf_supervisor_fly(&cf->supervisor, now_ms);
     ivl_cf_planner_hover(&cf->planner, p, 0.0f, now_ms);
     ivl_cf_commander_init(&cf->commander);
@@ -71,7 +58,7 @@ void ivl_cf_world_reset(ivl_cf_t *cf)
     cf->acc_g[0] = cf->acc_g[1] = 0.0f;
     cf->acc_g[2] = (float)cf->model.raw.world_gravity_mps2 / APP_MPS2_PER_G;
     const float hover_N = (float)(cf->model.mass_total_kg * cf->model.raw.world_gravity_mps2 / IVL_SIM_MOTORS);
-    ivl_app.collective_norm = app_norm_of_N(hover_N);
+    app_release(app_norm_of_N(hover_N));
     for (int i = 0; i < 4; i++)
     {
         cf->motor_N[i] = hover_N;
@@ -147,9 +134,9 @@ void ivl_cf_world_tick(ivl_cf_t *cf)
         ivl_cf_episode_look(cf);
         find_floor(cf);
     }
-    const ivl_phase_t before = ivl_app.state.phase;
+    const ivl_phase_t before = app_core_state()->phase;
     ivl_sim_world_tick(&cf->group, IVL_CF_LANE);
-    const ivl_phase_t after = ivl_app.state.phase;
+    const ivl_phase_t after = app_core_state()->phase;
     if (cf->episode.running)
     {
         ivl_sim_rollout_note(&cf->group, IVL_CF_LANE, &cf->episode.now);

@@ -11,6 +11,7 @@
 #include "phys_rotor.h"
 #include "phys_state.h"
 #include "world_sensors.h"
+#include "sim_autopilot.h"
 
 enum
 {
@@ -57,7 +58,8 @@ typedef struct
     ivl_sim_rotor_t        rotor;
     ivl_sim_sensors_t      sensors;
     ivl_state_t            firmware;
-    ivl_in_t               in;
+    ivl_in_t               in;  ///< what the sensors say, and the command
+    ivl_sim_autopilot_t    autopilot;
     ivl_out_t              out;
     ivl_sim_impact_t       impact;
     double                 t_touch_s[IVL_SIM_LEGS];    ///< since when a sliding foot presses

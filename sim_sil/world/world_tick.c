@@ -19,6 +19,20 @@ static void body_of(const ivl_sim_state_t *s, int lane, ivl_sim_kin_t *kin)
     }
 }
 
+static void fly(ivl_sim_group_t *group, int lane)
+{
+    ivl_sim_world_t       *w = &group->world[lane];
+    const ivl_sim_model_t *model = w->model;
+    if (model->core.has_autopilot)
+    {
+        model->core.step(group->port, lane, &model->firmware, &w->firmware, &w->in, &w->out);
+    }
+    else
+    {
+        ivl_sim_autopilot_step(model, group->port, lane, &w->in, &w->autopilot, &w->firmware, &w->out);
+    }
+}
+
 void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t       *w = &group->world[lane];
@@ -34,7 +48,7 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
         ivl_sim_scene_t scene = {.model = model, .kin = &kin};
         ivl_d3_store(scene.a_W_mps2, ivl_w3_lane(&group->last.a_WB_mps2, lane));
         ivl_sim_sensors_read(&scene, &w->rng, w->t_s, &w->sensors, &w->in);
-        model->core.step(group->port, lane, &model->firmware, &w->firmware, &w->in, &w->out);
+        fly(group, lane);
         ivl_sim_rotor_command(model, &w->rotor, w->out.thrust_N);
         const bool approaches = w->firmware.phase == IVL_PHASE_APPROACH;
         w->n_approach_tick += approaches ? 1 : 0;

@@ -12,6 +12,7 @@
 #include "crtp_commander_high_level.h"
 #include "debug.h"
 #include "pm.h"
+#include "range.h"
 #include "supervisor.h"
 #include "task.h"
 #include "unity.h"
@@ -227,11 +228,6 @@ size_t appchannelReceiveDataPacket(void *buffer, size_t max_length, int timeout_
 
 logVarId_t logGetVarId(const char *group, const char *name)
 {
-    if (strcmp(group, "range") == 0)
-    {
-        TEST_ASSERT_EQUAL_STRING("up", name);
-        return sdk.has_range ? 8u : 0xffffu;
-    }
     TEST_ASSERT_EQUAL_STRING("kalman", group);
     TEST_ASSERT_EQUAL_STRING_LEN("varP", name, 4);
     return sdk.has_variance ? 7u : 0xffffu;
@@ -239,12 +235,14 @@ logVarId_t logGetVarId(const char *group, const char *name)
 
 float logGetFloat(logVarId_t varid)
 {
-    if (varid == 8u)
-    {
-        return sdk.range_up_mm;
-    }
     TEST_ASSERT_EQUAL_UINT16(7u, varid);
     return sdk.variance_m2;
+}
+
+float rangeGet(rangeDirection_t direction)
+{
+    TEST_ASSERT_EQUAL_INT(rangeUp, direction);
+    return sdk.range_up_mm;
 }
 
 paramVarId_t paramGetVarId(const char *group, const char *name)

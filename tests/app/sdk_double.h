@@ -33,8 +33,7 @@ typedef struct
     bool         controller_runs;  ///< false: another controller is selected
     float        variance_m2;
     bool         has_variance;
-    float        range_up_mm;
-    bool         has_range;
+    float        range_up_mm;  ///< 0: no such sensor
     unsigned int motor_power_set;
     setpoint_t   setpoint;
     sensorData_t sensors;

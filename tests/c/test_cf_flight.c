@@ -384,6 +384,26 @@ static void test_the_app_flies_hover_and_hands_back(void)
     TEST_ASSERT_TRUE(info(4));
 }
 
+static void test_a_hand_back_empties_the_memory_of_the_stock_controller(void)
+{
+    const float still[3] = {0.0f, 0.0f, 0.0f};
+    take_off();
+    configure();
+    for (int ms = 0; ms < 5500; ms += 50)
+    {
+        // the stock controller's wanted point stays behind while the core flies elsewhere
+        TEST_ASSERT_TRUE(ivl_cf_set_velocity(vehicle, still, 0.0f));
+        const ivl_request_t request = (ms >= 500) ? IVL_REQUEST_HOVER : IVL_REQUEST_IDLE;
+        (void)send_command(request, 1.0f, 0.0f, 1.0f, 0.0f, 0.0f);
+        run_ms(46);
+    }
+    assert_at(1.0, 0.0, 1.0, 0.02);
+    TEST_ASSERT_EQUAL_UINT8(IVL_PHASE_IDLE, send_command(IVL_REQUEST_IDLE, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f).phase);
+    TEST_ASSERT_TRUE(ivl_cf_set_velocity(vehicle, still, 0.0f));
+    run_ms(400);
+    assert_at(1.0, 0.0, 1.0, 0.02);
+}
+
 static void test_a_silent_host_a_lost_link_and_a_request_abort_before_the_trigger(void)
 {
     for (int kind = 0; kind < 3; kind++)
@@ -628,6 +648,7 @@ int main(void)
     RUN_TEST(test_values_that_are_no_numbers_are_refused_everywhere);
     RUN_TEST(test_ways_of_the_high_level_commander_end_where_they_should_and_are_smooth);
     RUN_TEST(test_the_app_flies_hover_and_hands_back);
+    RUN_TEST(test_a_hand_back_empties_the_memory_of_the_stock_controller);
     RUN_TEST(test_a_silent_host_a_lost_link_and_a_request_abort_before_the_trigger);
     RUN_TEST(test_motors_that_are_driven_past_the_core_keep_it_from_arming_and_turn_whatever_the_supervisor_says);
     RUN_TEST(test_the_stock_controller_flies_alone_and_the_app_says_that_it_does_not_run);

@@ -7,7 +7,8 @@
 enum
 {
     N_GEARS = 6,
-    N_EACH = 60
+    N_EACH = 60,
+    TICK_MS_MAX = 4  // of the core: an echo may come before its tick
 };
 
 // length, rest angle and mass of a leg: the six designs of the paper as simulated
@@ -112,15 +113,27 @@ static void wait_for_end(const ivl_sim_spec_t *spec)
     TEST_ASSERT_EQUAL_INT(1, (int)read_log("sil", "ended"));
 }
 
+/// Until the core's next tick, at most.
+static void wait_for(const char *group, const char *name, double value)
+{
+    for (int ms = 0; ms < TICK_MS_MAX && fabs(read_log(group, name) - value) > 0.5; ms++)
+    {
+        run_ms(1);
+    }
+}
+
 /// As the host does it: reset, policy, hover, approach.
 static ivl_sim_outcome_t fly(const ivl_sim_spec_t *spec, uint32_t seq)
 {
     write_u8("sil", "reset", 1);
     TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, send_policy(seq, (float)spec->theta[0], (float)spec->theta[1]).status);
-    TEST_ASSERT_EQUAL_UINT8(IVL_PHASE_READY, send_command(IVL_REQUEST_HOVER, 0.0f, 0.0f, hover_z_m, 0.0f, 0.0f).phase);
+    (void)send_command(IVL_REQUEST_HOVER, 0.0f, 0.0f, hover_z_m, 0.0f, 0.0f);
+    wait_for("ivl", "phase", (double)IVL_PHASE_READY);
+    assert_phase(IVL_PHASE_READY);
     write_spec(spec);
     const double before = read_log("sil", "episode");
     (void)send_command(IVL_REQUEST_APPROACH, 0.0f, 0.0f, 1.0f, (float)spec->speed_mps[0], angle_of(spec));
+    wait_for("sil", "episode", before + 1.0);
     TEST_ASSERT_EQUAL_INT((int)before + 1, (int)read_log("sil", "episode"));
     wait_for_end(spec);
     ivl_sim_outcome_t             outcome;
@@ -134,29 +147,91 @@ static ivl_sim_outcome_t fly(const ivl_sim_spec_t *spec, uint32_t seq)
 
 // ---- equality
 
+static int n_landed, n_missed;
+
+/// Flies the same random landings with the vehicle and without it.
+static void compare_landings(const ivl_sim_model_t *model, draws_t *draws, int n)
+{
+    open_vehicle(model);
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit_config(1).status);
+    for (int i = 0; i < n; i++)
+    {
+        const ivl_sim_spec_t    spec = draw_spec(draws, (ivl_sim_start_t)(i % IVL_SIM_START_STATE));
+        const ivl_sim_outcome_t expected = fly_linked(model, &spec), outcome = fly(&spec, 10u + (uint32_t)i);
+        TEST_ASSERT_EQUAL_MEMORY(&expected, &outcome, sizeof expected);
+        n_landed += (expected.n_legs[0] >= 3) ? 1 : 0;
+        n_missed += (expected.n_legs[0] == 0) ? 1 : 0;
+    }
+    ivl_cf_close(vehicle);
+    vehicle = NULL;
+}
+
 static void test_landings_have_the_bits_of_the_same_landing_in_the_process_of_the_host(void)
 {
     draws_t draws = {77};
-    int     n_landed = 0, n_missed = 0;
+    n_landed = n_missed = 0;
     for (int gear = 0; gear < N_GEARS; gear++)
     {
         const ivl_sim_params_t params = noisy_params(gear);
         const ivl_sim_model_t  model = fixture_model(&params);
-        open_vehicle(&model);
-        TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit_config(1).status);
-        for (int i = 0; i < N_EACH; i++)
-        {
-            const ivl_sim_spec_t    spec = draw_spec(&draws, (ivl_sim_start_t)(i % IVL_SIM_START_STATE));
-            const ivl_sim_outcome_t expected = fly_linked(&model, &spec), outcome = fly(&spec, 10u + (uint32_t)i);
-            TEST_ASSERT_EQUAL_MEMORY(&expected, &outcome, sizeof expected);
-            n_landed += (expected.n_legs[0] >= 3) ? 1 : 0;
-            n_missed += (expected.n_legs[0] == 0) ? 1 : 0;
-        }
-        ivl_cf_close(vehicle);
-        vehicle = NULL;
+        compare_landings(&model, &draws, N_EACH);
     }
     // of both kinds enough
     TEST_ASSERT_TRUE(n_landed >= 5 && n_missed >= 5);
+}
+
+static ivl_sim_model_t model_at(const ivl_sim_params_t *params, float tick_hz, uint8_t d_source)
+{
+    ivl_sim_model_t model;
+    ivl_cfg_t       cfg;
+    char            error[256] = "";
+    ivl_cfg_defaults(&cfg);
+    cfg.tick_hz = tick_hz;
+    cfg.d_source = d_source;
+    TEST_ASSERT_TRUE_MESSAGE(ivl_sim_model_init(&model, params, &cfg, error, sizeof error), error);
+    return model;
+}
+
+static void test_so_they_have_at_every_rate_of_the_stabilizer(void)
+{
+    const float rates_hz[] = {1000.0f, 250.0f};
+    draws_t     draws = {78};
+    for (int i = 0; i < 2; i++)
+    {
+        const ivl_sim_params_t params = noisy_params(2);
+        const ivl_sim_model_t  model = model_at(&params, rates_hz[i], 0);
+        compare_landings(&model, &draws, 12);
+    }
+}
+
+static void test_so_they_have_with_a_camera_a_ranging_sensor_and_lost_samples(void)
+{
+    draws_t          draws = {79};
+    ivl_sim_params_t params = noisy_params(2);
+    params.sense_pose_rate_hz = 200.0;
+    params.sense_pose_drop_norm = 0.1;
+    params.sense_position_resolution_m = 0.001;
+    params.rrev_rate_hz = 50.0;
+    params.rrev_delay_s = 0.02;
+    params.rrev_noise_per_s = 0.2;
+    params.range_rate_hz = 40.0;
+    params.range_noise_m = 0.01;
+    params.range_max_m = 4.0;
+    params.flow_rate_hz = 70.0;
+    params.flow_noise_radps = 0.2;
+    for (uint8_t d_source = 1; d_source <= 3; d_source++)
+    {
+        const ivl_sim_model_t model = model_at(&params, 500.0f, d_source);
+        compare_landings(&model, &draws, 12);
+    }
+}
+
+static void test_so_they_have_without_any_noise(void)
+{
+    draws_t                draws = {80};
+    const ivl_sim_params_t params = fixture_params();
+    const ivl_sim_model_t  model = fixture_model(&params);
+    compare_landings(&model, &draws, 12);
 }
 
 static void open_noisy(ivl_sim_model_t *model)
@@ -345,6 +420,9 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_landings_have_the_bits_of_the_same_landing_in_the_process_of_the_host);
+    RUN_TEST(test_so_they_have_at_every_rate_of_the_stabilizer);
+    RUN_TEST(test_so_they_have_with_a_camera_a_ranging_sensor_and_lost_samples);
+    RUN_TEST(test_so_they_have_without_any_noise);
     RUN_TEST(test_speed_and_angle_come_from_the_command_unless_a_parameter_tells_them_more_precisely);
     RUN_TEST(test_a_landing_that_was_cut_short_by_a_reset_leaves_no_trace_in_the_next_one);
     RUN_TEST(test_an_approach_as_flown_begins_where_the_vehicle_hovers_and_is_judged_too);

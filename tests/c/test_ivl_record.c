@@ -3,7 +3,7 @@
 #include "ivl_record.h"
 #include "test_ivl_support.h"
 
-#define HEADER_SIZE 32u
+#define HEADER_SIZE 36u
 #define ROW_SIZE    44u
 
 static fix_t          fix;
@@ -94,7 +94,9 @@ static void test_flip_is_recorded_with_what_was_before_it(void)
     TEST_ASSERT_EQUAL_UINT32(1, number_at(10, 1));
     TEST_ASSERT_EQUAL_UINT32(1, number_at(12, 4));
     TEST_ASSERT_EQUAL_UINT32(7, number_at(16, 4));
-    TEST_ASSERT_EQUAL_UINT32(t_trigger_us, number_at(28, 4));
+    TEST_ASSERT_EQUAL_HEX32(constant_policy(7, 4.0f, 0.008f).id.crc, number_at(20, 4));
+    TEST_ASSERT_EQUAL_UINT32(0, number_at(11, 1));
+    TEST_ASSERT_EQUAL_UINT32(t_trigger_us, number_at(32, 4));
     // the row of the trigger, and order of time throughout
     const uint32_t row = number_at(8, 2);
     TEST_ASSERT_EQUAL_UINT32(t_trigger_us, row_at(row, 0, 4));

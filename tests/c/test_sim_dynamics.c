@@ -140,12 +140,12 @@ typedef struct
 {
     int      at, turn;
     ivl_d3_t arm;
-} point_t;
+} spot_t;
 
-static void constrain(reference_t *r, ivl_d3_t along, point_t plus, point_t minus, double compliance)
+static void constrain(reference_t *r, ivl_d3_t along, spot_t plus, spot_t minus, double compliance)
 {
     const int     row = N_Q + r->n_c;
-    const point_t points[2] = {plus, minus};
+    const spot_t points[2] = {plus, minus};
     for (int k = 0; k < 2; k++)
     {
         const double sign = k ? -1.0 : 1.0;
@@ -232,8 +232,8 @@ static void add_leg(reference_t *r, const ivl_sim_model_t *model, const ivl_sim_
     add_force(r, rod, ivl_d3(0.0, 0.0, -raw->leg_mass_kg * raw->world_gravity_mps2));
     add_force(r, ball, ivl_d3(0.0, 0.0, -raw->leg_foot_mass_kg * raw->world_gravity_mps2));
 
-    const point_t at_hip = {rod, turn, ivl_d3_scale(-0.5 * length, n)}, of_body = {0, 3, hip};
-    const point_t at_foot = {rod, turn, ivl_d3_scale(0.5 * length, n)}, of_ball = {ball, -1, {0.0, 0.0, 0.0}},
+    const spot_t at_hip = {rod, turn, ivl_d3_scale(-0.5 * length, n)}, of_body = {0, 3, hip};
+    const spot_t at_foot = {rod, turn, ivl_d3_scale(0.5 * length, n)}, of_ball = {ball, -1, {0.0, 0.0, 0.0}},
                   ceiling = {-1, -1, {0.0, 0.0, 0.0}};
     // the hip: along the rod, with the slip, and across it
     ivl_d3_t across = ivl_d3_cross(n, axis_vector(fabs(n.x) < 0.6 ? 0 : 1));

@@ -173,6 +173,35 @@ static void test_a_further_sensor_is_a_row(void)
     TEST_ASSERT_EQUAL_UINT64(0, in.rrev.t_us);  // no row, no reading
 }
 
+static void test_the_noise_of_a_camera_has_a_constant_part_and_one_of_the_value(void)
+{
+    ivl_sim_params_t params = fixture_params();
+    params.rrev_rate_hz = 500.0;
+    params.rrev_noise_per_s = 0.3;
+    params.rrev_noise_rel_norm = 0.05;
+    params.flow_rate_hz = 500.0;
+    params.flow_noise_radps = 0.2;
+    const ivl_sim_model_t model = fixture_model(&params);
+    const ivl_sim_kin_t   kin = moving(&model, 0.0);  // RREV 2 1/s, OF_y -1 rad/s
+    const double          still[3] = {0.0, 0.0, 0.0};
+    const int             n = 20000;
+    double                rrev = 0.0, flow = 0.0;
+    ivl_in_t              in = {.t_us = 0};
+    begin(&model);
+    for (size_t i = 0; i < sizeof sensors.readings / sizeof sensors.readings[0]; i++)
+    {
+        sensors.readings[i].next_s = 0.0;
+    }
+    for (int tick = 0; tick < n; tick++)
+    {
+        look(&model, &kin, still, 0.002 * tick, &in);
+        rrev += ((double)in.rrev.value - 2.0) * ((double)in.rrev.value - 2.0);
+        flow += ((double)in.flow.value + 1.0) * ((double)in.flow.value + 1.0);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, sqrt(0.3 * 0.3 + 2.0 * 0.05 * 2.0 * 0.05), sqrt(rrev / n));
+    TEST_ASSERT_DOUBLE_WITHIN(0.007, 0.2, sqrt(flow / n));
+}
+
 static void test_a_low_pass_has_its_delay_and_corner(void)
 {
     ivl_sim_params_t params = fixture_params();
@@ -270,6 +299,7 @@ int main(void)
     RUN_TEST(test_no_sensor_no_reading);
     RUN_TEST(test_noise_offset_rounding_limits_and_losses);
     RUN_TEST(test_a_further_sensor_is_a_row);
+    RUN_TEST(test_the_noise_of_a_camera_has_a_constant_part_and_one_of_the_value);
     RUN_TEST(test_a_low_pass_has_its_delay_and_corner);
     RUN_TEST(test_dead_reckoning_follows_the_accelerometer);
     RUN_TEST(test_an_attitude_from_a_clipped_gyro_lags_behind);

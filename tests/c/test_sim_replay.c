@@ -273,10 +273,11 @@ static void test_tables_describe_what_crosses_the_flat_interface(void)
     TEST_ASSERT_EQUAL_size_t(sizeof(ivl_in_t), size);
     TEST_ASSERT_NOT_NULL(ivl_sil_table(IVL_SIL_TABLE_REPLAY_OUT, &n, &size));
     TEST_ASSERT_EQUAL_size_t(sizeof(ivl_sim_replay_row_t), size);
+    const double theta[IVL_SIM_THETAS] = {4.6, 8.0e-3}, beyond[IVL_SIM_THETAS] = {21.0};
     (void)fly(&model, IVL_SIM_START_IMPARTED, 4.6);
-    TEST_ASSERT_EQUAL_INT(0, ivl_sil_replay(&model, &model.firmware, (float)4.6, (float)(8.0 * 1.0e-3), diary.in, diary.n, rows));
+    TEST_ASSERT_EQUAL_INT(0, ivl_sil_replay(&model, &model.firmware, 0, theta, diary.in, diary.n, rows));
     TEST_ASSERT_EQUAL_UINT8(1, rows[diary.n - 1].triggered);
-    TEST_ASSERT_EQUAL_INT(2, ivl_sil_replay(&model, &model.firmware, 21.0f, 0.0f, diary.in, diary.n, rows));
+    TEST_ASSERT_EQUAL_INT(2, ivl_sil_replay(&model, &model.firmware, 0, beyond, diary.in, diary.n, rows));
 }
 
 int main(void)

@@ -1,0 +1,87 @@
+#include "sim_autopilot.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "app_convert.h"
+
+/// Of the SDK's ranging sensor: nothing found.
+static const float RANGE_NONE_MM = 32767.0f;
+static const float MM_PER_M = 1000.0f;
+
+/// Calls of the controller a second, whatever the rate of the core.
+static const double LOOP_HZ = (double)RATE_MAIN_LOOP;
+
+static Axis3f axis3(ivl_vec3_t a, float unit)
+{
+    return (Axis3f){a.x / unit, a.y / unit, a.z / unit};
+}
+
+/// One unit in the last place, at least.
+static float next_to(float x)
+{
+    return x + (1.0e-9f + 1.2e-7f * fabsf(x));
+}
+
+static ivl_vec3_t told_position(ivl_sim_told_t *told, const ivl_in_t *sensed)
+{
+    if (sensed->t_pose_us != told->t_pose_us)
+    {
+        const bool is_same = memcmp(&told->p_W_m, &sensed->p_WB_m, sizeof told->p_W_m) == 0;
+        told->t_pose_us = sensed->t_pose_us;
+        told->p_W_m = sensed->p_WB_m;
+        told->p_W_m.x = is_same ? next_to(told->p_W_m.x) : told->p_W_m.x;
+    }
+    return told->p_W_m;
+}
+
+void ivl_sim_sdk_of(ivl_sim_told_t *told, const ivl_in_t *sensed, sensorData_t *sensors, state_t *state)
+{
+    const ivl_quat_t q = sensed->q_WB;
+    const ivl_vec3_t p = told_position(told, sensed), v = sensed->v_WB_mps;
+    *sensors = (sensorData_t){.acc = axis3(sensed->f_B_mps2, APP_MPS2_PER_G), .gyro = axis3(sensed->w_B_radps, APP_RADPS_PER_DEGPS)};
+    *state = (state_t){
+        .attitudeQuaternion = {q.x, q.y, q.z, q.w}, .position = {.x = p.x, .y = p.y, .z = p.z}, .velocity = {.x = v.x, .y = v.y, .z = v.z}};
+}
+
+float ivl_sim_sdk_range_mm(const ivl_reading_t *range)
+{
+    if (range->t_us == 0u)
+    {
+        return 0.0f;
+    }
+    const float mm = floorf(range->value * MM_PER_M + 0.5f);
+    return (range->valid != 0u && mm >= 0.0f && mm < RANGE_NONE_MM) ? mm : RANGE_NONE_MM;
+}
+
+float ivl_sim_motor_N(float norm, float thrust_N_max)
+{
+    return ivl_clamp(norm, 0.0f, 1.0f) * thrust_N_max;
+}
+
+void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, const ivl_in_t *sensed, ivl_sim_autopilot_t *autopilot,
+                            ivl_state_t *firmware, ivl_out_t *out)
+{
+    const int    n_loop = (model->tick_s * LOOP_HZ > 1.5) ? (int)(model->tick_s * LOOP_HZ + 0.5) : 1;
+    const float  loop_s = (float)(model->tick_s / n_loop), max_N = model->firmware.motor_thrust_N_max;
+    ivl_in_t    *in = &autopilot->in;
+    sensorData_t sensors;
+    state_t      state;
+    ivl_sim_sdk_of(&autopilot->told, sensed, &sensors, &state);
+    in->cmd = sensed->cmd;
+    in->rrev = sensed->rrev;
+    in->flow = sensed->flow;
+    app_sense_motion(&autopilot->senses, &sensors, &state, firmware->phase, loop_s, sensed->t_us, in);
+    app_sense_range(&autopilot->senses, ivl_sim_sdk_range_mm(&sensed->range), sensed->t_us, &in->range);
+    model->core.step(port, lane, &model->firmware, firmware, in, out);
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        out->thrust_N[i] = ivl_sim_motor_N(out->thrust_N[i] / max_N, max_N);
+    }
+    // the controller is called more often than the core, and carries the attitude on with the gyro that it has
+    ivl_in_t between = *in;
+    for (int i = 1; i < n_loop; i++)
+    {
+        app_sense_motion(&autopilot->senses, &sensors, &state, firmware->phase, loop_s, sensed->t_us, &between);
+    }
+}
