@@ -6,7 +6,6 @@ same unit). Names, units and ranges are those of the library's parameter table; 
 parameter at most once, and exactly once if it has no default.
 """
 
-import difflib
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -25,7 +24,9 @@ GEARS_DIR = Path(__file__).parent / "gears"
 SENSORS_DIR = Path(__file__).parent / "sensors"
 SENSING_GROUPS = ("sense", "rrev", "range", "flow")
 """Groups of parameters that a sensor set gives as a whole: what it leaves out is at its default."""
-DEFAULT_GEAR_SET = "table1"
+DEFAULT_VEHICLE, DEFAULT_GEAR, DEFAULT_GEAR_SET = "habas2021", "wide_short", "table1"
+"""What is flown where nobody says anything else: the paper's vehicle with legs of the paper's Table I, which are those
+that were built and flown. Who repeats the authors' simulation names its legs, as the shipped experiments do."""
 
 Table = Mapping[str, native.Field]
 
@@ -178,7 +179,7 @@ def load_gear(design: str, gear_set: str = DEFAULT_GEAR_SET, table: Table | None
     designs = _designs(data, path.name)
     if design not in designs:
         raise ConfigError(
-            f"{path.name}: no gear {design!r}{_did_you_mean(design, designs)} (allowed {', '.join(designs)})"
+            f"{path.name}: no gear {design!r}{yamlfile.did_you_mean(design, designs)} (allowed {', '.join(designs)})"
         )
     label = f"{path.name}[{design}]"
     own = designs[design]
@@ -239,6 +240,11 @@ def check_override(name: str, value: Any, table: Table | None = None) -> float:
     return float(value)
 
 
+def unit(name: str) -> str:
+    """Unit of a parameter of the library's table."""
+    return native.library().params[name].unit
+
+
 def _locate(name_or_path: str, folder: Path, kind: str) -> Path:
     """A path is taken as given; a bare name is looked up in the package."""
     if name_or_path.endswith((".yaml", ".yml")) or "/" in name_or_path:
@@ -249,7 +255,7 @@ def _locate(name_or_path: str, folder: Path, kind: str) -> Path:
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     if name_or_path not in known:
         raise ConfigError(
-            f"no {kind} {name_or_path!r}{_did_you_mean(name_or_path, known)} (allowed {', '.join(known)})"
+            f"no {kind} {name_or_path!r}{yamlfile.did_you_mean(name_or_path, known)} (allowed {', '.join(known)})"
         )
     return folder / f"{name_or_path}.yaml"
 
@@ -310,10 +316,5 @@ def _allowed(field: native.Field) -> str:
 
 def _table_field(name: str, label: str, table: Table) -> native.Field:
     if name not in table:
-        raise ConfigError(f"{label}: {name}: unknown parameter{_did_you_mean(name, table)}")
+        raise ConfigError(f"{label}: {name}: unknown parameter{yamlfile.did_you_mean(name, table)}")
     return table[name]
-
-
-def _did_you_mean(name: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f", did you mean {close[0]!r}?" if close else ""
