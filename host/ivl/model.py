@@ -53,6 +53,14 @@ class _SensorHeader(_Header):
     includes: list[str] = Field(default_factory=list)
 
 
+class _Reference(BaseModel):
+    """A number that is another one of the same sensor set, as the noise that a filter expects: `{from: rrev.noise}`."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    of: str = Field(alias="from", min_length=1)
+
+
 @dataclass(frozen=True)
 class Part:
     """A vehicle or a gear as read: its checked quantities by dotted parameter name.
@@ -139,12 +147,38 @@ def load_sensors(name_or_path: str, table: Table | None = None) -> Part:
     """Read and check a sensor set: the groups `SENSING_GROUPS`, and flight parameters that go with them.
 
     A set may name others under `includes`: it has what they have, a later one wins over an earlier one, and its own
-    values win over all of theirs. Arguments and errors as `load_vehicle`.
+    values win over all of theirs. A flight parameter `{from: rrev.noise}` has the value that this parameter has in the
+    whole set, whichever file gives it; an override of the one does not change the other. Arguments and errors as
+    `load_vehicle`.
     """
-    return _load_sensors(name_or_path, table or native.library().params, ())
+    table = table or native.library().params
+    header, label, given = _load_sensors(name_or_path, table, ())
+    quantities = {name: _followed(name, entry, given, table, label) for name, entry in given.items()}
+    return Part(header.name, header.doc, label, quantities)
 
 
-def _load_sensors(name_or_path: str, table: Table, including: tuple[Path, ...]) -> Part:
+def _followed(
+    name: str, entry: Quantity | _Reference, given: Mapping[str, Quantity | _Reference], table: Table, label: str
+) -> Quantity:
+    """A number of a sensor set, or the one that it refers to."""
+    if isinstance(entry, Quantity):
+        return entry
+    where = f"{label}: {name}: from {entry.of}"
+    source = given.get(entry.of)
+    if not isinstance(source, Quantity):
+        numbers = [known for known, other in given.items() if isinstance(other, Quantity)]
+        what = "the set gives it no number" if entry.of in given or entry.of in table else "unknown parameter"
+        raise ConfigError(f"{where}: {what}{yamlfile.did_you_mean(entry.of, numbers)}")
+    if source.unit != table[name].unit:
+        raise ConfigError(f"{where}: its unit is {source.unit!r}, not {table[name].unit!r}")
+    _check_range(source.value, table[name], where)
+    return source.model_copy(update={"source": f"as {entry.of}"})
+
+
+def _load_sensors(
+    name_or_path: str, table: Table, including: tuple[Path, ...]
+) -> tuple[_SensorHeader, str, dict[str, Quantity | _Reference]]:
+    """Header, label, and numbers and references of a set and of what it includes."""
     path = _locate(name_or_path, SENSORS_DIR, "sensor set")
     if path in including:
         raise ConfigError(
@@ -158,11 +192,29 @@ def _load_sensors(name_or_path: str, table: Table, including: tuple[Path, ...]) 
             raise ConfigError(
                 f"{path.name}: {group}: not part of a sensor set (allowed {', '.join(SENSING_GROUPS)}, firmware)"
             )
-    quantities: dict[str, Quantity] = {}
+    given: dict[str, Quantity | _Reference] = {}
     for name in header.includes:
-        quantities |= _load_sensors(name, table, (*including, path)).quantities
-    quantities |= _quantities(groups, path.name, table)
-    return Part(header.name, header.doc, path.name, quantities)
+        given |= _load_sensors(name, table, (*including, path))[2]
+    references = _references(groups, path.name, table)
+    numbers = {
+        group: {key: raw for key, raw in members.items() if f"{group}.{key}" not in references}
+        if isinstance(members, dict)
+        else members
+        for group, members in groups.items()
+    }
+    return header, path.name, given | _quantities(numbers, path.name, table) | references
+
+
+def _references(groups: Mapping[str, Any], label: str, table: Table) -> dict[str, _Reference]:
+    """The flight parameters of a sensor set that are written `{from: ..}`."""
+    members = groups.get("firmware")
+    found = {}
+    for key, raw in members.items() if isinstance(members, dict) else ():
+        if isinstance(raw, dict) and "from" in raw:
+            name = f"firmware.{key}"
+            _table_field(name, label, table)
+            found[name] = yamlfile.validate(_Reference, raw, f"{label}: {name}")
+    return found
 
 
 def without_sensors(vehicle: Part) -> Part:

@@ -95,9 +95,18 @@ def _kinds(annotation: Any) -> Iterable[Any]:
 
 
 def did_you_mean(name: str, known: Iterable[str], at_any_distance: bool = False) -> str:
-    """The known name that is nearest to one with a slip in it, as the end of a sentence; empty if none is near."""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.0 if at_any_distance else 0.6)
-    return f", did you mean {close[0]!r}?" if close else ""
+    """The known name that is nearest to one with a slip in it, as the end of a sentence; empty if none is near.
+
+    Args:
+        name: The name that is not known.
+        known: Those that are.
+        at_any_distance: Tell the nearest even if it is none that one would mistype so.
+    """
+    names = list(known)
+    if close := difflib.get_close_matches(name, names, n=1):
+        return f", did you mean {close[0]!r}?"
+    nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.0) if at_any_distance else []
+    return f" (the nearest is {nearest[0]})" if nearest else ""
 
 
 def explain(error: ValidationError, known: Iterable[str] = ()) -> str:

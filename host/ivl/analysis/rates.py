@@ -47,10 +47,10 @@ def cell_rates(trials: pd.DataFrame, rate: str = RATE) -> pd.DataFrame:
         rate: Column with the rate of a trial.
 
     Returns:
-        One row per cell, columns that name it (`cell_columns`) and: `n_trials`; `rate_mean_norm` with `rate_low_norm`, `rate_high_norm`
-        (Wilson with the trials as observations, see `intervals`); `rate_best_norm` with `best_low_norm`,
-        `best_high_norm` (Wilson over the rollouts of that trial alone: to have been chosen as the best of several
-        makes it look better than it is, and no interval says by how much); `n_solved`.
+        One row per cell, columns that name it (`cell_columns`) and: `n_trials`; `rate_mean_norm` with `rate_low_norm`,
+        `rate_high_norm` (Wilson with the trials as observations, see `intervals`); `rate_best_norm` with
+        `best_low_norm`, `best_high_norm` (Wilson over the rollouts of that trial alone: to have been chosen as the best
+        of several makes it look better than it is, and no interval says by how much); `n_solved`.
     """
     keys = cell_columns(trials)
     known = trials.loc[trials[rate].notna(), [*keys, rate, COUNT[rate]]]

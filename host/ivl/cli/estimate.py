@@ -16,9 +16,9 @@ from ivl.task import Task
 
 HELP = """Show how well the flight core knows the distance of the ceiling.
 
-The task is that of experiments/paper_vertical.yaml, its landing gear too. Landings start from a hover and are judged at the trigger. Error is |d - true d| / true d; NEES is the mean of
-(error / sigma)^2, 1 for an honest sigma; cover is the share of errors within two sigma; valid is the share of the
-approach with a valid distance.
+Landing gear, speed and angle are those of experiments/paper_vertical.yaml. Landings start from a hover and are judged
+at the trigger. Error is |d - true d| / true d; NEES is the mean of (error / sigma)^2, 1 for an honest sigma; cover is
+the share of errors within two sigma; valid is the share of the approach with a valid distance.
 
 \\b
 Examples:

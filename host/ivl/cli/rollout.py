@@ -31,7 +31,7 @@ Examples:
 """
 
 
-@task_options(*EQUIPMENT, "speed_mps", "angle_deg", "start", with_experiment="What an experiment flies, to be changed.")
+@task_options(*EQUIPMENT, "speed_mps", "angle_deg", "start")
 def rollout(
     chosen: Chosen,
     rrev: Annotated[float, typer.Option(help="Trigger threshold RREV_c, 1/s.")],

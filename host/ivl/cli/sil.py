@@ -33,7 +33,7 @@ Examples:
 """
 
 
-@task_options(*EQUIPMENT, with_experiment="Vehicle, gear and settings of an experiment.")
+@task_options(*EQUIPMENT)
 def sil(
     chosen: Chosen,
     port: Annotated[int, typer.Option(help="UDP port of the first vehicle; 0 takes a free one.")] = 19850,

@@ -1,9 +1,9 @@
 """Options that say what is flown, made from the fields of the task: `--gear`, `--sensors`, `--set` and their like.
 
-    @task_options("vehicle", "gear", "gear_set", experiment=True)
+    @task_options("vehicle", "gear", "gear_set")
     def command(chosen: Chosen, ...): ...
 
-The command gets `chosen` with what was said; in its help stand the texts and defaults of the fields themselves.
+The command gets `chosen` with what was said; its help has the texts and defaults of the fields themselves.
 """
 
 import inspect
@@ -70,12 +70,12 @@ class Chosen:
         return setup.world_of(gear)
 
 
-def task_options(*names: str, with_experiment: str) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
-    """Give a command the options of some fields, `--set` and `--experiment` (with this help) instead of `chosen`."""
+def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
+    """Give a command the options of some fields, `--experiment` and `--set`, instead of its parameter `chosen`."""
 
     def give(command: Callable[..., Result]) -> Callable[..., Result]:
         own = inspect.signature(command, eval_str=True)
-        options = [*(_option(name) for name in names), *_general(with_experiment)]
+        options = [*(_option(name) for name in names), *_general()]
         kept = [parameter for parameter in own.parameters.values() if parameter.name != "chosen"]
 
         @wraps(command)
@@ -103,10 +103,11 @@ def _option(name: str) -> inspect.Parameter:
     return _parameter(name, Annotated[kind | None, typer.Option(*FLAGS[name], help=shown)])
 
 
-def _general(with_experiment: str) -> list[inspect.Parameter]:
+def _general() -> list[inspect.Parameter]:
+    path = "What an experiment flies; the other options change it."
     text = "Change a field of the task or a parameter of the world."
     return [
-        _parameter("experiment", Annotated[str | None, typer.Option("--experiment", help=with_experiment)]),
+        _parameter("experiment", Annotated[str | None, typer.Option("--experiment", help=path)]),
         _parameter("settings", Annotated[list[str] | None, typer.Option("--set", metavar="A.B=C", help=text)]),
     ]
 

@@ -11,7 +11,7 @@ grouped, where and in which order they run, or how often a run was cut off. The 
 of two learners are paired, like the seeds of `ivl learn`, and `ivl learn --seed RUN_SEED` repeats a trial.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -414,10 +414,12 @@ def _load(
         _refuse_varied(data, "learner.name", f"{file.name}: --learner {replacements['learner']}")
     grid = yamlfile.validate(kind, data, file.name)
     check_overrides(grid.overrides, file.name)
-    for name, chosen in grid.vary.items():
+    for name in grid.vary:
         check_path(name, varied, f"{file.name}: vary", _NEVER_VARIED)
-        if name not in AXES:
-            _check_values(grid, name, chosen, file.name)
+    try:
+        _check_variants(grid)
+    except ConfigError as error:
+        raise ConfigError(f"{file.name}: {error}") from error
     return grid
 
 
@@ -446,10 +448,16 @@ def _apply_vary(data: dict[str, Any], vary: Sequence[str], label: str) -> None:
         data["vary"] = {**(data.get("vary") or {}), **given}
 
 
-def _check_values(grid: Grid, name: str, chosen: list[Value], label: str) -> None:
-    """Try each value of a varied path alone."""
-    for value in chosen:
-        try:
-            grid.at(((name, value),))
-        except ConfigError as error:
-            raise ConfigError(f"{label}: {error}") from error
+def _check_variants(grid: _Grid) -> None:
+    """Try every variant, and the files that varied values name."""
+    read: dict[str, Callable[[str], object]] = {
+        "vehicle": model.load_vehicle, "sensing": model.load_sensors, "gear_set": model.list_gears,
+    }  # fmt: skip
+    for path in read.keys() & grid.vary.keys():
+        for name in grid.vary[path]:
+            if isinstance(name, str):
+                read[path](name)
+    for varied in grid.variants():
+        at = grid.at(varied)
+        for gear in at.vary.get("gear", ()):
+            model.load_gear(str(gear), at.gear_set)
