@@ -68,7 +68,7 @@ def values(axis: list[float] | Range) -> list[float]:
 Value = str | bool | int | float | None
 """What a varied path may take; None is YAML's null."""
 Varied = tuple[tuple[str, Value], ...]
-"""One value of each varied path, in the order of the file; those of `AXES` are not among them."""
+"""One value of each varied path, the paths in order; those of `AXES` are not among them."""
 
 AXES = {"gear": "gears", "speed_mps": "speeds_mps", "angle_deg": "angles_deg"}
 """Paths that every sweep has an axis of, and the field that is short for varying them."""
@@ -143,8 +143,11 @@ class _Grid(Setup, Named):
         return [(speed, angle) for speed in self.axis("speed_mps") for angle in self.axis("angle_deg")]
 
     def variants(self) -> list[Varied]:
-        """Every combination of the varied paths that are none of `AXES`; one without any path if there are none."""
-        paths = [path for path in self.vary if path not in AXES]
+        """Every combination of the varied paths that are none of `AXES`; one without any path if there are none.
+
+        Tasks are numbered in this order, which for that reason does not depend on the order of the paths in a file.
+        """
+        paths = sorted(path for path in self.vary if path not in AXES)
         return [tuple(zip(paths, chosen, strict=True)) for chosen in product(*(self.vary[path] for path in paths))]
 
     def variant_of(self, row: Mapping[str, Any]) -> Varied:
@@ -178,8 +181,9 @@ class _Grid(Setup, Named):
         return yamlfile.validate(type(self), data, label)
 
     def make_world(self, gear: str) -> World:
-        """The world of one landing gear, of a sweep or map that varies `AXES` alone."""
-        return self.world_of(gear)
+        """The world of one landing gear, of a sweep or map with one variant."""
+        (varied,) = self.variants()
+        return self.at(varied).world_of(gear)
 
     def worlds(self) -> dict[str, World]:
         """Every world that is flown in, by the name that `world_name` gives it."""
@@ -188,7 +192,7 @@ class _Grid(Setup, Named):
             grid = self.at(varied)
             for gear in grid.gear_names():
                 name = world_name(gear, varied)
-                found[name] = found[name] if name in found else grid.make_world(gear)
+                found[name] = found[name] if name in found else grid.world_of(gear)
         return found
 
     def key(self, gear: str, speed_mps: float, angle_deg: float) -> str:
