@@ -1,6 +1,7 @@
 """What is flown is spelled once: experiment, landing, study and options come to the same task and the same world."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -177,3 +178,14 @@ def test_a_sensor_set_that_nobody_varies_flies_the_same_bits_by_name_and_by_task
     rrev_c_per_s = np.linspace(4.0, 6.0, 8)
     direct = ivl.World(sensing="mocap").rollouts(2.5, 90.0, rrev_c_per_s, 8.0)
     assert task.make_world().rollouts(2.5, 90.0, rrev_c_per_s, 8.0).tobytes() == direct.tobytes()
+
+
+def test_the_files_that_the_design_sends_people_to_are_there() -> None:
+    root = Path(__file__).parents[2]
+    text = (root / "docs" / "DESIGN.md").read_text(encoding="utf-8")
+    rows = text.partition("How to add\n")[2].partition("\n## ")[0]
+    named = re.findall(r"`((?:firmware|sim_sil|host)/[\w/.]+)`", rows)
+    assert len(named) >= 8
+    assert [path for path in named if not (root / path).exists()] == []
+    for name, path in re.findall(r"`([A-Z_0-9]+)` (?:of|in) `([\w/.]+)`", rows):
+        assert f"\n{name}" in (root / path).read_text(encoding="utf-8"), (name, path)
