@@ -286,6 +286,15 @@ def test_what_is_wrong_with_a_varied_path_is_one_line(vary: str, complaint: str,
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("vary", [["sensing"], "sensing", {"sensing": "mocap"}, {1: [2]}])
+def test_a_vary_of_another_shape_is_one_line(vary: Any, tmp_path: Path) -> None:
+    for texts in ((), ("sensing=mocap",)):
+        if isinstance(vary, dict) and texts and "sensing" in vary:
+            continue  # the command line replaces it
+        with pytest.raises(ConfigError, match=r"^sweep\.yaml: vary"):
+            loaded(tmp_path, *texts, vary=vary)
+
+
 def test_what_would_do_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="sensing is given twice"):
         loaded(tmp_path, "sensing=mocap", "sensing=ideal")

@@ -33,7 +33,12 @@ LABELS = {
     "speed_mps": "$V$ (m/s)",
     "angle_deg": r"$\varphi$ (°)",
 }
-_PREFERRED = {"vehicle": "habas2021", "gear_set": model.DEFAULT_GEAR_SET, "gear": "wide_short", "learner": "bo"}
+_PREFERRED = {
+    "vehicle": model.DEFAULT_VEHICLE,
+    "gear_set": model.DEFAULT_GEAR_SET,
+    "gear": model.DEFAULT_GEAR,
+    "learner": "bo",
+}
 SETUP = tuple(_PREFERRED)
 
 

@@ -16,8 +16,9 @@ from ivl.report import replay
 from ivl.report.landings import Album, thinned
 from ivl.report.page import encode, flatten, learner_words
 from ivl.sweep import store
-from ivl.sweep.config import Sweep, load_sweep, text_of
+from ivl.sweep.config import Sweep, load_sweep
 from ivl.sweep.schema import cell_columns, varied_columns
+from ivl.sweep.vary import text_of
 
 CAMPAIGN_GEARS, CAMPAIGN_APPROACHES = 6, 100
 """A run with fewer gears or approaches says nothing about the paper's claims (which rest on 6 and 240)."""

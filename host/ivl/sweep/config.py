@@ -6,7 +6,7 @@ Any field of an experiment and any parameter of the world can be varied (`vary: 
 speeds and angles have short fields of their own. A *variant* is one value of each varied path but these three;
 `Sweep.at` gives the sweep with the values in their fields.
 
-A trial's random numbers follow from its name alone (`trial_seed`), so that results do not depend on how trials are
+A trial's random numbers follow from its name alone (`Sweep.run_seed`), so that results do not depend on how trials are
 grouped, where and in which order they run, or how often a run was cut off. The learner is not part of the name: trials
 of two learners are paired, like the seeds of `ivl learn`, and `ivl learn --seed RUN_SEED` repeats a trial.
 """
@@ -14,10 +14,10 @@ of two learners are paired, like the seeds of `ivl learn`, and `ivl learn --seed
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from ivl import experiment, model, native, yamlfile
 from ivl.errors import ConfigError, LearnerError
@@ -36,44 +36,31 @@ from ivl.settings import (
     read_mapping,
 )
 from ivl.sweep.schema import column_of
+from ivl.sweep.vary import (
+    AXES,
+    COUNT_MAX,
+    Axis,
+    Value,
+    Varied,
+    apply_vary,
+    as_cell,
+    is_flown,
+    listed,
+    refuse_varied,
+    text_of,
+    values,
+    world_name,
+)
 from ivl.task import Setup, Task
 from ivl.world import World
 
 SWEEPS_DIR = PACKAGE_DIR / "sweeps"
-_COUNT_MAX = 100_000
+_SEED_HAS = ("vehicle", "gear_set")
+"""Fields that the name of a cell contains, varied or not."""
 _NEVER_VARIED = ("name", "doc", "seed", "check", "flown", "overrides")
 """Fields of an experiment that say nothing of a single cell; overrides are varied by the parameter's own path."""
 
 Grid = TypeVar("Grid", bound="_Grid")
-
-
-class Range(Strict):
-    """Equally spaced values, both ends included."""
-
-    first: Finite
-    last: Finite
-    count: int = Field(ge=1, le=_COUNT_MAX)
-
-
-Axis = Annotated[list[Finite], Field(min_length=1, max_length=_COUNT_MAX)] | Range
-
-
-def values(axis: list[float] | Range) -> list[float]:
-    """The values of an axis, rounded to what a person would have typed."""
-    if isinstance(axis, Range):
-        return [round(float(x), 9) for x in np.linspace(axis.first, axis.last, axis.count)]
-    return [float(x) for x in axis]
-
-
-Value = str | bool | int | float | None
-"""What a varied path may take; None is YAML's null."""
-Varied = tuple[tuple[str, Value], ...]
-"""One value of each varied path, the paths in order; those of `AXES` are not among them."""
-
-AXES = {"gear": "gears", "speed_mps": "speeds_mps", "angle_deg": "angles_deg"}
-"""Paths that every sweep has an axis of, and the field that is short for varying them."""
-_SEED_HAS = ("vehicle", "gear_set")
-"""Fields that the name of a cell contains, varied or not."""
 
 
 class _Grid(Setup, Named):
@@ -95,7 +82,7 @@ class _Grid(Setup, Named):
         if not isinstance(data, dict) or not isinstance(data.get("vary") or {}, dict):
             return data
         given = data.get("vary") or {}
-        return {**data, "vary": {str(path): _listed(str(path), value) for path, value in given.items()}}
+        return {**data, "vary": {str(path): listed(str(path), value) for path, value in given.items()}}
 
     @model_validator(mode="after")
     def _in_range(self) -> Self:
@@ -214,64 +201,6 @@ class _Grid(Setup, Named):
         return yamlfile.dump(self.model_dump(mode="json"))
 
 
-def is_flown(path: str) -> bool:
-    """Whether a path is part of the task: a field of it, or a parameter of the world."""
-    return path.split(".")[0] in Task.model_fields or path in native.library().params
-
-
-def world_name(gear: str, varied: Varied) -> str:
-    """Name of a world in a run: the landing gear and whatever else is varied of what is flown."""
-    return "|".join([gear, *(f"{path}={text_of(value)}" for path, value in varied if is_flown(path))])
-
-
-def text_of(value: Value) -> str:
-    """A value as YAML has it."""
-    if value is None:
-        return "null"
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def as_cell(value: Value) -> float | str:
-    """A value as the tables have it: a number, or text."""
-    return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else text_of(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _listed(path: str, given: Any) -> list[Any]:
-    """Values of a varied path, from a list or a range.
-
-    Raises:
-        ValueError: They are no list of single values of one kind, each given once.
-    """
-    where = f"vary.{path}"
-    if isinstance(given, Range) or (isinstance(given, dict) and set(given) == set(Range.model_fields)):
-        try:
-            return list(values(Range.model_validate(given)))
-        except ValidationError as error:
-            raise ValueError(f"{where}: {yamlfile.explain(error)}") from error
-    if not isinstance(given, list) or not given:
-        what = "the list is empty" if given == [] else f"value {given!r}"
-        raise ValueError(f"{where}: {what}: expected a list of values, or first, last and count")
-    for value in given:
-        if not isinstance(value, Value):
-            raise ValueError(f"{where}: value {value!r} is no single value")
-    if 0 < sum(map(_is_number, given)) < len(given):
-        raise ValueError(f"{where}: numbers and other values are mixed{_hint(given)}")
-    as_float = path in native.library().params or path in ("speed_mps", "angle_deg")
-    found = [float(value) if as_float and _is_number(value) else value for value in given]
-    if len({(isinstance(value, bool), value) for value in found}) < len(found):
-        raise ValueError(f"{where}: a value is given twice")
-    return found
-
-
-def _hint(given: list[Any]) -> str:
-    """Advice for the first number that YAML took as text."""
-    return next((hint for value in given if (hint := yamlfile.number_hint(value))), "")
-
-
 class StartRange(Strict):
     """Where the search of each trial starts: mu0 is drawn from these ranges, by the trial's own random numbers."""
 
@@ -283,7 +212,7 @@ class Sweep(_Grid):
     """A complete, checked sweep: one learner, or each of several, over all cells."""
 
     start: Literal["imparted", "flown"] = "imparted"
-    trials: int = Field(ge=1, le=_COUNT_MAX, description="per cell")
+    trials: int = Field(ge=1, le=COUNT_MAX, description="per cell")
     policy: Policy
     mu0_range: StartRange | None = Field(default=None, description="null: every trial starts from policy.*.mu0")
     learner: LearnerChoice
@@ -410,12 +339,12 @@ def _load(
     file = locate(path, list_sweeps())
     data = read_mapping(file)
     experiment.replace(data, replacements)
-    _apply_vary(data, vary, file.name)
+    apply_vary(data, vary, file.name)
     for setting in settings:
-        _refuse_varied(data, parse_setting(setting)[0], f"{file.name}: --set {setting}")
+        refuse_varied(data, parse_setting(setting)[0], f"{file.name}: --set {setting}")
         apply_setting(data, setting, kind, file.name)
     if replacements.get("learner") is not None:
-        _refuse_varied(data, "learner.name", f"{file.name}: --learner {replacements['learner']}")
+        refuse_varied(data, "learner.name", f"{file.name}: --learner {replacements['learner']}")
     grid = yamlfile.validate(kind, data, file.name)
     check_overrides(grid.overrides, file.name)
     for name in grid.vary:
@@ -425,31 +354,6 @@ def _load(
     except ConfigError as error:
         raise ConfigError(f"{file.name}: {error}") from error
     return grid
-
-
-def _refuse_varied(data: dict[str, Any], name: str, what: str) -> None:
-    """Refuse to give one value to a path that is varied: it would do nothing."""
-    vary = data.get("vary")
-    if isinstance(vary, dict) and name in vary:
-        raise ConfigError(f"{what}: {name} is varied (--vary {name}=... replaces its values)")
-
-
-def _apply_vary(data: dict[str, Any], vary: Sequence[str], label: str) -> None:
-    """Write the texts of `--vary` into raw data, in place of what the file says of the same paths."""
-    given: dict[str, Any] = {}
-    for text in vary:
-        name, equals, listed = text.partition("=")
-        name = name.strip()
-        if not equals or not name:
-            raise ConfigError(f"{label}: --vary {text!r}: expected path=values, for example learner.name=ephe,bo")
-        if name in given:
-            raise ConfigError(f"{label}: --vary {text}: {name} is given twice")
-        found = yamlfile.parse(f"[{listed}]", f"{label}: --vary {text}")
-        given[name] = found[0] if len(found) == 1 and isinstance(found[0], (dict, list)) else found
-        for same in (name, AXES[name]) if name in AXES else ():
-            data.pop(same, None)
-    if given:
-        data["vary"] = {**(data.get("vary") or {}), **given}
 
 
 def _check_variants(grid: _Grid) -> None:

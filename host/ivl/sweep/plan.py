@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ivl.sweep.config import PolicyMap, Sweep, Varied, world_name
+from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.trials import Trial
+from ivl.sweep.vary import Varied, world_name
 
 TASKS_PER_WORKER = 8  # at least so many if there are trials enough, so that the last ones end together
 SIZE_MIN, SIZE_MAX = 4, 32

@@ -4,8 +4,9 @@ from typing import Any
 
 from ivl import yamlfile
 from ivl.sweep import plan, schema, store
-from ivl.sweep.config import AXES, PolicyMap, Sweep, Value, as_cell, values
+from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.engine import Result
+from ivl.sweep.vary import AXES, Value, as_cell, values
 
 STUCK_RATE, SOLVED_RATE = 0.5, 0.8
 """A trial is stuck below the first if another trial of its cell reached the second."""

@@ -17,9 +17,10 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from ivl import native
 from ivl.errors import NativeError
 from ivl.sweep import policymap, schema, tables, trials
-from ivl.sweep.config import PolicyMap, Sweep, as_cell
+from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.plan import Task
 from ivl.sweep.trials import Trial
+from ivl.sweep.vary import as_cell
 from ivl.world import World
 
 Tables = dict[str, pa.Table]
