@@ -107,9 +107,9 @@ def check_range(name: str, value: float, what: str) -> None:
 
 def default_of(field: str) -> Any:
     """Value of a field of the task where a command names none; None if it must be named."""
-    return {"vehicle": model.DEFAULT_VEHICLE, "gear": model.DEFAULT_GEAR}.get(
-        field, Task.model_fields[field].get_default()
-    )
+    named = {"vehicle": model.DEFAULT_VEHICLE, "gear": model.DEFAULT_GEAR}
+    entry = Task.model_fields[field]
+    return named.get(field, None if entry.is_required() else entry.get_default())
 
 
 def settings_of(values: Mapping[str, float], source: str) -> dict[str, Setting]:

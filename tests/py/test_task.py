@@ -93,6 +93,8 @@ def test_options_settings_and_an_experiment_come_to_the_same_landing(capsys: Cap
     out = world.rollouts(2.5, 90.0, 4.8, 8.0, start="flown")
     assert by_options["t_end_s"] == out.t_end_s[()]
     assert by_options != flown(capsys, "--experiment", ONBOARD, "--speed", "3.5")
+    at_trigger = flown(capsys, "--experiment", ONBOARD, "--start", "at_trigger", "--distance", "0.5")
+    assert (at_trigger["triggered"], at_trigger["t_trigger_s"] < 0.1) == (1, True)
 
 
 def test_options_of_a_command_change_its_experiment() -> None:
@@ -126,6 +128,7 @@ def test_every_field_of_the_task_has_an_option_and_a_text() -> None:
         (["--speed", "2.5", "--angle", "90", "--approach", "fast"], "approach: value 'fast': unknown approach"),
         (["--speed", "2.5", "--angle", "90", "--set", "sensng=mocap"], "sensng: unknown key, did you mean 'sensing'?"),
         (["--experiment", ONBOARD, "--set", "sensng=mocap"], "onboard_only.yaml: sensng: unknown key"),
+        (["--experiment", ONBOARD, "--gear", "wide_long", "--set", "gear=wide_short"], "--gear says it, too"),
         (["--experiment", ONBOARD, "--sensors", "camera5"], "no sensor set 'camera5'"),
     ],
 )

@@ -149,6 +149,7 @@ def test_a_page_tells_variants_apart_and_flies_their_landings_again_bit_for_bit(
     assert made.n_different == 0
     assert made.n_landings == 32
     data, _ = sweep_page.collect(run, 100, lambda *_: None)
+    assert ["Varied", "sensing: mocap, null; learner.name: ephe, cmaes; sense.phase_random: 1.0, 0.0"] in data["facts"]
     assert len(data["sweep"]["gears"]) == 8
     assert "wide_long, learner.name ephe, sense.phase_random 0.0, sensing mocap" in data["sweep"]["gears"]
     assert sorted(data["sweep"]["cells"]["gear"]) == sorted([*range(8)] * 2)

@@ -15,7 +15,8 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from ivl import experiment, yamlfile
-from ivl.settings import apply_setting
+from ivl.errors import ConfigError
+from ivl.settings import apply_setting, parse_setting
 from ivl.task import Setup, Task, default_of
 from ivl.world import World
 
@@ -54,13 +55,21 @@ class Chosen:
     path: str | None = None
 
     def fields(self) -> dict[str, Any]:
-        """Fields of the task as raw data: those of the experiment, or the defaults, and what was said."""
+        """Fields of the task as raw data: those of the experiment, or the defaults, and what was said.
+
+        Raises:
+            ConfigError: The experiment or a setting is wrong, or an option and a setting say the same.
+        """
+        for setting in self.settings:
+            name, _ = parse_setting(setting)
+            if name in self.given:
+                raise ConfigError(f"--set {setting}: {FLAGS[name][0]} says it, too")
         if self.path is not None:
-            return experiment.load(self.path, self.settings, **self.given).task()
-        data = {name: default_of(name) for name in ("vehicle", "gear")} | self.given
+            return experiment.load(self.path, self.settings).task() | self.given
+        data = {name: default_of(name) for name in ("vehicle", "gear")}
         for setting in self.settings:
             apply_setting(data, setting, Task, _LABEL)
-        return data
+        return data | self.given
 
     def make_world(self) -> World:
         """The world alone, for commands that are told the approach by somebody else."""

@@ -18,7 +18,7 @@ from ivl.report.page import encode, flatten, learner_words
 from ivl.sweep import store
 from ivl.sweep.config import Sweep, load_sweep
 from ivl.sweep.schema import cell_columns, varied_columns
-from ivl.sweep.vary import text_of
+from ivl.sweep.vary import AXES, text_of
 
 CAMPAIGN_GEARS, CAMPAIGN_APPROACHES = 6, 100
 """A run with fewer gears or approaches says nothing about the paper's claims (which rest on 6 and 240)."""
@@ -125,8 +125,10 @@ def _is_recorded(sweep: Sweep, trial: pd.Series) -> Callable[[Any], bool]:
 
 def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list[str]]:
     n_solved = int((cells["rate_best_norm"] >= SOLVED_RATE).sum())
+    varied = [f"{path}: {', '.join(map(text_of, given))}" for path, given in sweep.vary.items() if path not in AXES]
     return [
         ["Vehicle and gears", f"{sweep.vehicle}, {sweep.gear_set}"],
+        *([["Varied", "; ".join(varied)]] if varied else []),
         ["Learner", ", ".join(learner_words(name) for name in sweep.learner_names())],
         ["Cells and trials", f"{len(cells)} cells, {_finished(sweep, trials)} trials"],
         ["Rollouts", f"{int(trials['n_rollouts'].sum()):,}"],
