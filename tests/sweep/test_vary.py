@@ -218,7 +218,7 @@ def test_the_command_line_shows_a_group_for_each_learner(
     assert [group["learner.name"] for group in found["groups"]] == ["ephe", "bo"]
     assert (found["trials"], found["cells"]) == (24, 12)
     for group in found["groups"]:
-        assert group["cells"] == 6
+        assert (group["cells"], group["trials"]) == (6, 12)
         assert set(group["landing_rate_mean"]) == {"narrow_short", "wide_long"}
     folder = Path(found["run"])
     manifest = store.read_manifest(folder)
@@ -230,7 +230,7 @@ def test_the_command_line_shows_a_group_for_each_learner(
             assert value == pytest.approx(means[group["learner.name"], gear], abs=1e-4)
     again = ["sweep", "sweeps/smoke.yaml", *words, *small, "--resume", "--out", str(folder)]
     assert cli.run(again) == 0
-    assert "learner.name                       ephe" in capsys.readouterr().out
+    assert "\n\nlearner.name                       ephe\n" in capsys.readouterr().out
     assert cli.run([*again, "--vary", "sensing=mocap"]) == 2
     assert "--set sensing=camera50: sensing is varied" in capsys.readouterr().err
     assert cli.run([*again, "--vary", "approach=constant_rrev"]) == 1

@@ -194,9 +194,15 @@ def _print(report: dict[str, Any], as_json: bool) -> None:
         console.print_json(report)
         return
     groups = report.get("groups", [])
-    for values in ({name: value for name, value in report.items() if name != "groups"}, *groups):
-        for name, value in values.items():
-            console.out.print(f"{name.replace('_', ' '):34s} {_text(value)}", highlight=False, soft_wrap=True)
+    _print_lines({name: value for name, value in report.items() if name != "groups"})
+    for group in groups:
+        console.out.print()
+        _print_lines({name: "null" if value is None else value for name, value in group.items()})
+
+
+def _print_lines(values: dict[str, Any]) -> None:
+    for name, value in values.items():
+        console.out.print(f"{name.replace('_', ' '):34s} {_text(value)}", highlight=False, soft_wrap=True)
 
 
 def _text(value: Any) -> str:

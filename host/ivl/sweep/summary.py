@@ -59,7 +59,7 @@ def of_run(result: Result) -> dict[str, Any]:
     if not len(trials):
         return report
     sweep = yamlfile.validate(Sweep, store.read_manifest(result.run)["sweep"], str(result.run))
-    groups = [{**names, **_learned(part)} for names, part in by_variant(sweep, trials)]
+    groups = [{**names, "trials": len(part), **_learned(part)} for names, part in by_variant(sweep, trials)]
     return {**report, **_learned(trials), **({"groups": groups} if groups else {})}
 
 
