@@ -19,10 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from ivl import estimation, four_leg, sensing
+from ivl import estimation, experiment, four_leg
 from ivl.cli.console import number, percent
 from ivl.plots import sensing as plot
-from ivl.world import World
 
 ROOT = Path(__file__).parent.parent
 CACHE = ROOT / "build" / "estimation"
@@ -85,7 +84,7 @@ def learn(sensors: str, estimator: str) -> dict[str, Any]:
 
 def best_rate(sensors: str, estimator: str, speed_mps: float) -> float:
     """Four-leg rate of the best policy of a grid, judged by fresh rollouts."""
-    world = World("habas2021", "wide_short", "as_simulated", sensors, **sensing.estimator_settings(estimator))
+    world = experiment.load(estimation.EXPERIMENT, sensing=sensors, estimator=estimator).make_world()
     axes = np.meshgrid(np.arange(2.5, 7.01, 0.15), np.array([6.0, 7.5, 9.0, 10.5]), indexing="ij")
     policies = np.stack([axis.ravel() for axis in axes], axis=1)
     for stage, (keep, n) in enumerate(((len(policies), 12), (16, 100), (1, SPEED_RUNS))):

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from ivl import model, sensing
+from ivl import experiment, model, sensing
 from ivl.outcome import four_leg
-from ivl.world import World
+from ivl.task import Task, settings_of
 
 RREV_C_PER_S, MOMENT_Y_NMM = 4.8, 8.0
 """Policy of the study: the trigger is where the paper's policies have it."""
-SPEED_MPS, ANGLE_DEG = 2.5, 90.0
-"""The paper's vertical experiment."""
+EXPERIMENT = "experiments/paper_vertical.yaml"
+"""Landing gear, speed and angle of the study are those of the paper's vertical experiment."""
 ACCELERATIONS_MPS2 = {"accelerate_hold": 4.3, "constant_acceleration": 1.8, "constant_rrev": 4.3}
 """Acceleration of each approach: that of the paper's experiment, and one that lasts until the trigger."""
 TARGET_MEDIAN, TARGET_P90 = 0.05, 0.12
@@ -69,14 +69,11 @@ class Cell:
         return asdict(self)
 
 
-def make_world(approach: str, sensors: str, estimator: str, vehicle: str = "habas2021", **overrides: float) -> World:
-    """The world of one cell, with the landing gear of the paper's experiment."""
-    settings = {
-        **sensing.approach_settings(approach),
-        **sensing.estimator_settings(estimator),
-        "firmware.approach_accel": ACCELERATIONS_MPS2[approach],
-    }
-    return World(vehicle, "wide_short", "as_simulated", sensors, **{**settings, **overrides})
+def make_task(approach: str, sensors: str, estimator: str, vehicle: str | None = None, **overrides: float) -> Task:
+    """The task of one cell, from a hover; the vehicle is the experiment's if none is named."""
+    chosen = experiment.load(EXPERIMENT, vehicle=vehicle, approach=approach, sensing=sensors, estimator=estimator)
+    values = {"firmware.approach_accel": ACCELERATIONS_MPS2[approach], **overrides}
+    return Task(**{**chosen.task(), "start": "flown", "overrides": settings_of(values, "the study")})
 
 
 def study(
@@ -85,13 +82,14 @@ def study(
     estimator: str,
     n: int,
     seed: int = 0,
-    vehicle: str = "habas2021",
+    vehicle: str | None = None,
     threads: int | None = None,
 ) -> Cell:
     """Fly `n` rollouts of one cell and judge the distance at the trigger."""
-    world = make_world(approach, sensors, estimator, vehicle)
-    out = world.rollouts(
-        SPEED_MPS, ANGLE_DEG, np.full(n, RREV_C_PER_S), MOMENT_Y_NMM, seed=seed, start="flown", threads=threads
+    task = make_task(approach, sensors, estimator, vehicle)
+    policy = np.full(n, RREV_C_PER_S), MOMENT_Y_NMM
+    out = task.make_world().rollouts(
+        task.speed_mps, task.angle_deg, *policy, seed=seed, start=task.start, threads=threads
     )
     in_time = (out.triggered == 1) & ~(out.t_trigger_s >= out.t_impact_s)
     judged = out[in_time]

@@ -6,38 +6,22 @@ included.
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
-from ivl import forms, model, native, sensing, yamlfile
+from ivl import forms, yamlfile
 from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
 from ivl.reward import REWARDS, RewardOptions
-from ivl.world import World
+from ivl.settings import PACKAGE_DIR, Finite, Strict, apply_setting, check_overrides, locate, read_mapping
+from ivl.task import Task
 
-PACKAGE_DIR = Path(__file__).parent
 EXPERIMENTS_DIR = PACKAGE_DIR / "experiments"
 GRID_DIMENSIONS_MAX = 2
 """The best possible policy of a form with more parameters is looked for without a grid."""
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Bounds = Annotated[list[Finite], Field(min_length=2, max_length=2)]
-
-
-class Strict(BaseModel):
-    """Base of what is read from YAML: no conversion, no unknown key, no change afterwards."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-
-class Setting(Strict):
-    """A world parameter that this experiment changes."""
-
-    value: float
-    unit: str = Field(min_length=1)
-    source: str = Field(min_length=1)
 
 
 class PolicyParameter(Strict):
@@ -157,23 +141,17 @@ class Flown(PerParameter):
         return self
 
 
-class Experiment(Strict):
-    """A complete, checked experiment; `to_yaml` gives the text from which the same object is read."""
+class Named(Strict):
+    """What a file calls itself."""
 
     name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$")
     doc: str = Field(min_length=1)
-    vehicle: str
-    gear: str
-    gear_set: str = model.DEFAULT_GEAR_SET
-    speed_mps: Finite = Field(gt=0)
-    angle_deg: Finite
+
+
+class Experiment(Task, Named):
+    """A complete, checked experiment; `to_yaml` gives the text from which the same object is read."""
+
     start: Literal["imparted", "flown"] = "imparted"
-    sensing: str | None = Field(default=None, description="sensor set that replaces the vehicle's own sensing")
-    approach: Literal["accelerate_hold", "constant_acceleration", "constant_rrev"] = "accelerate_hold"
-    estimator: (
-        Literal["known_height", "known_height_predicted", "formula", "formula_unguarded", "kalman", "range"] | None
-    ) = Field(default=None, description="source of the distance; None: as vehicle or sensor set say")
-    overrides: dict[str, Setting] = Field(default_factory=dict)
     policy: Policy
     learner: LearnerChoice
     n_rollouts: int = Field(default=8, ge=1, le=10_000)
@@ -193,15 +171,6 @@ class Experiment(Strict):
     def n_episodes(self) -> int:
         """Episodes of `n_rollouts` that the budget pays for."""
         return self.budget // self.n_rollouts
-
-    def world_settings(self) -> dict[str, float]:
-        """World parameters that differ from what vehicle, gear and sensor set say."""
-        overrides = {name: setting.value for name, setting in self.overrides.items()}
-        return {**sensing.approach_settings(self.approach), **sensing.estimator_settings(self.estimator), **overrides}
-
-    def make_world(self) -> World:
-        """The world that this experiment flies in."""
-        return World(self.vehicle, self.gear, self.gear_set, self.sensing, **self.world_settings())
 
     def make_learner(self, seed: int) -> Learner:
         """A new learner at the start of its search."""
@@ -238,15 +207,18 @@ def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experi
         ConfigError: One line naming file, field and value.
     """
     file = locate(path, list_experiments())
-    data = yamlfile.read(file)
-    if not isinstance(data, dict):
-        raise ConfigError(f"{file.name}: expected a mapping of fields, got {type(data).__name__}")
+    data = read_mapping(file)
+    replace(data, replacements)
+    for setting in settings:
+        apply_setting(data, setting, Experiment, file.name)
+    return from_data(data, file.name)
+
+
+def replace(data: dict[str, Any], replacements: Mapping[str, Any]) -> None:
+    """Replace fields of raw data; None leaves what is there, `learner` is a name and drops the options."""
     for name, value in replacements.items():
         if value is not None:
             data[name] = {"name": value} if name == "learner" else value
-    for setting in settings:
-        apply_setting(data, setting)
-    return from_data(data, file.name)
 
 
 def from_data(data: Any, label: str) -> Experiment:
@@ -278,53 +250,3 @@ def check_policy(experiment: Experiment, label: str) -> None:
                 raise ConfigError(f"check.grid.{name}: no axis of this name (allowed {allowed})")
     except (ArgumentError, ConfigError) as error:
         raise ConfigError(f"{label}: {error}") from error
-
-
-def parse_setting(setting: str) -> tuple[str, Any]:
-    """Split "name=value"; the value is read as YAML."""
-    name, equals, text = setting.partition("=")
-    if not equals or not name.strip():
-        raise ConfigError(f"--set {setting!r}: expected name=value, for example sense.latency=0.01")
-    return name.strip(), yamlfile.parse(text, f"--set {setting}")
-
-
-def locate(path: str, shipped: Sequence[str]) -> Path:
-    """A file as given, else inside this package; `shipped` are the names that an error offers."""
-    for candidate in (Path(path), PACKAGE_DIR / path):
-        if candidate.is_file():
-            return candidate
-    raise ConfigError(f"{path}: no such file, neither here nor in the package (shipped: {', '.join(shipped)})")
-
-
-def apply_setting(data: dict[str, Any], setting: str) -> None:
-    """Write one setting into the raw data of an experiment or a sweep."""
-    name, value = parse_setting(setting)
-    table = native.library().params
-    if name in table:
-        checked = model.check_override(name, value)
-        data["overrides"] = {**(data.get("overrides") or {})}
-        data["overrides"][name] = {"value": checked, "unit": table[name].unit, "source": "set on the command line"}
-        return
-    *parents, last = name.split(".")
-    if parents and parents[0] not in data and any(known.startswith(f"{parents[0]}.") for known in table):
-        model.check_override(name, value)  # a slip in the name of a parameter, which this refuses with advice
-    target = data
-    for key in parents:
-        target = target.setdefault(key, {})
-        if not isinstance(target, dict):
-            raise ConfigError(f"--set {setting}: {key} is a value, it has no field {last!r}")
-    target[last] = value
-
-
-def check_overrides(overrides: Mapping[str, Setting], label: str) -> None:
-    """Check names, values and units of overrides; `label` names their file in errors."""
-    for name, setting in overrides.items():
-        try:
-            model.check_override(name, setting.value)
-        except ConfigError as error:
-            raise ConfigError(f"{label}: {error}") from error
-        unit = native.library().params[name].unit
-        if setting.unit != unit:
-            raise ConfigError(
-                f"{label}: override: {name}: value {setting.value!r} has unit {setting.unit!r}, not {unit!r}"
-            )

@@ -3,47 +3,50 @@
     spec = LandingSpec(gear="wide_long", speed_mps=3.0, angle_deg=60.0, rrev_c_per_s=4.0, moment_y_Nmm=7.0)
     world, trace = spec.fly()
 
-The fields are the options of `ivl rollout`. Equal specifications give the same bits, today and in a report years later.
+A landing is a task (`ivl.task`) with the policy and the random numbers of one rollout. Equal specifications give the
+same bits, today and in a report years later.
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field, model_validator
 
 from ivl import model, yamlfile
+from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.seeds import Purpose, derive
+from ivl.settings import Finite, check_overrides
+from ivl.task import Task, settings_of
 from ivl.world import Trace, World
 
 TRACE_PERIOD_S = 0.001
 """Finest useful period: rows come once a tick of the flight core at the most."""
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 
-
-class LandingSpec(BaseModel):
+class LandingSpec(Task):
     """What is flown; the simulator checks the ranges."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-    vehicle: str = "habas2021"
-    gear: str = "wide_short"
-    gear_set: str = model.DEFAULT_GEAR_SET
-    sensing: str | None = None
-    overrides: dict[str, float] = Field(default_factory=dict)
-    speed_mps: Finite
-    angle_deg: Finite
+    vehicle: str = model.DEFAULT_VEHICLE
+    gear: str = model.DEFAULT_GEAR
     rrev_c_per_s: Finite
     moment_y_Nmm: Finite
-    start: Literal["imparted", "flown", "at_trigger"] = "imparted"
-    d_ceil_m: Finite | None = None
+    d_ceil_m: Finite | None = Field(default=None, description="Distance to the ceiling at the start, m.")
     seed: int = Field(default=0, ge=0, lt=2**64)
     stream: int = Field(default=0, ge=0, lt=2**64)
 
-    def make_world(self) -> World:
-        """The world that the landing is flown in."""
-        return World(self.vehicle, self.gear, self.gear_set, self.sensing, **self.overrides)
+    @model_validator(mode="before")
+    @classmethod
+    def _with_units(cls, data: Any) -> Any:
+        """A parameter of the world may be a number alone, as after `--set`."""
+        overrides = data.get("overrides") if isinstance(data, dict) else None
+        if not isinstance(overrides, dict):
+            return data
+        plain = {name: value for name, value in overrides.items() if isinstance(value, (int, float))}
+        try:
+            return {**data, "overrides": {**overrides, **settings_of(plain, "the specification")}}
+        except ConfigError as error:
+            raise ValueError(str(error)) from error
 
     def fly(self, world: World | None = None, period_s: float = TRACE_PERIOD_S) -> tuple[World, Trace]:
         """Fly it and record the time series; a world that exists already saves building one."""
@@ -68,22 +71,17 @@ def load(path: Path) -> LandingSpec:
     Raises:
         ConfigError: One line naming file, field and value.
     """
-    return yamlfile.validate(LandingSpec, yamlfile.read(path), path.name)
+    spec = yamlfile.validate(LandingSpec, yamlfile.read(path), path.name)
+    check_overrides(spec.overrides, path.name)
+    return spec
 
 
 def of_rollout(experiment: Experiment, trial: int, theta: tuple[float, float], stream: int) -> LandingSpec:
     """The specification of one rollout of a learning run: trial t flies with the seed of the run plus t."""
     return LandingSpec(
-        vehicle=experiment.vehicle,
-        gear=experiment.gear,
-        gear_set=experiment.gear_set,
-        sensing=experiment.sensing,
-        overrides=experiment.world_settings(),
-        speed_mps=experiment.speed_mps,
-        angle_deg=experiment.angle_deg,
+        **experiment.task(),
         rrev_c_per_s=theta[0],
         moment_y_Nmm=theta[1],
-        start=experiment.start,
         seed=derive(experiment.seed + trial, Purpose.WORLD),
         stream=stream,
     )

@@ -6,7 +6,6 @@ same unit). Names, units and ranges are those of the library's parameter table; 
 parameter at most once, and exactly once if it has no default.
 """
 
-import difflib
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -25,7 +24,9 @@ GEARS_DIR = Path(__file__).parent / "gears"
 SENSORS_DIR = Path(__file__).parent / "sensors"
 SENSING_GROUPS = ("sense", "rrev", "range", "flow")
 """Groups of parameters that a sensor set gives as a whole: what it leaves out is at its default."""
-DEFAULT_GEAR_SET = "table1"
+DEFAULT_VEHICLE, DEFAULT_GEAR, DEFAULT_GEAR_SET = "habas2021", "wide_short", "table1"
+"""What is flown where nobody says anything else: the paper's vehicle with legs of the paper's Table I, which are those
+that were built and flown. Who repeats the authors' simulation names its legs, as the shipped experiments do."""
 
 Table = Mapping[str, native.Field]
 
@@ -50,6 +51,14 @@ class _Header(BaseModel):
 
 class _SensorHeader(_Header):
     includes: list[str] = Field(default_factory=list)
+
+
+class _Reference(BaseModel):
+    """A number that is another one of the same sensor set, as the noise that a filter expects: `{from: rrev.noise}`."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    of: str = Field(alias="from", min_length=1)
 
 
 @dataclass(frozen=True)
@@ -138,12 +147,38 @@ def load_sensors(name_or_path: str, table: Table | None = None) -> Part:
     """Read and check a sensor set: the groups `SENSING_GROUPS`, and flight parameters that go with them.
 
     A set may name others under `includes`: it has what they have, a later one wins over an earlier one, and its own
-    values win over all of theirs. Arguments and errors as `load_vehicle`.
+    values win over all of theirs. A flight parameter `{from: rrev.noise}` has the value that this parameter has in the
+    whole set, whichever file gives it; an override of the one does not change the other. Arguments and errors as
+    `load_vehicle`.
     """
-    return _load_sensors(name_or_path, table or native.library().params, ())
+    table = table or native.library().params
+    header, label, given = _load_sensors(name_or_path, table, ())
+    quantities = {name: _followed(name, entry, given, table, label) for name, entry in given.items()}
+    return Part(header.name, header.doc, label, quantities)
 
 
-def _load_sensors(name_or_path: str, table: Table, including: tuple[Path, ...]) -> Part:
+def _followed(
+    name: str, entry: Quantity | _Reference, given: Mapping[str, Quantity | _Reference], table: Table, label: str
+) -> Quantity:
+    """A number of a sensor set, or the one that it refers to."""
+    if isinstance(entry, Quantity):
+        return entry
+    where = f"{label}: {name}: from {entry.of}"
+    source = given.get(entry.of)
+    if not isinstance(source, Quantity):
+        numbers = [known for known, other in given.items() if isinstance(other, Quantity)]
+        what = "the set gives it no number" if entry.of in given or entry.of in table else "unknown parameter"
+        raise ConfigError(f"{where}: {what}{yamlfile.did_you_mean(entry.of, numbers)}")
+    if source.unit != table[name].unit:
+        raise ConfigError(f"{where}: its unit is {source.unit!r}, not {table[name].unit!r}")
+    _check_range(source.value, table[name], where)
+    return source.model_copy(update={"source": f"as {entry.of}"})
+
+
+def _load_sensors(
+    name_or_path: str, table: Table, including: tuple[Path, ...]
+) -> tuple[_SensorHeader, str, dict[str, Quantity | _Reference]]:
+    """Header, label, and numbers and references of a set and of what it includes."""
     path = _locate(name_or_path, SENSORS_DIR, "sensor set")
     if path in including:
         raise ConfigError(
@@ -157,11 +192,29 @@ def _load_sensors(name_or_path: str, table: Table, including: tuple[Path, ...]) 
             raise ConfigError(
                 f"{path.name}: {group}: not part of a sensor set (allowed {', '.join(SENSING_GROUPS)}, firmware)"
             )
-    quantities: dict[str, Quantity] = {}
+    given: dict[str, Quantity | _Reference] = {}
     for name in header.includes:
-        quantities |= _load_sensors(name, table, (*including, path)).quantities
-    quantities |= _quantities(groups, path.name, table)
-    return Part(header.name, header.doc, path.name, quantities)
+        given |= _load_sensors(name, table, (*including, path))[2]
+    references = _references(groups, path.name, table)
+    numbers = {
+        group: {key: raw for key, raw in members.items() if f"{group}.{key}" not in references}
+        if isinstance(members, dict)
+        else members
+        for group, members in groups.items()
+    }
+    return header, path.name, given | _quantities(numbers, path.name, table) | references
+
+
+def _references(groups: Mapping[str, Any], label: str, table: Table) -> dict[str, _Reference]:
+    """The flight parameters of a sensor set that are written `{from: ..}`."""
+    members = groups.get("firmware")
+    found = {}
+    for key, raw in members.items() if isinstance(members, dict) else ():
+        if isinstance(raw, dict) and "from" in raw:
+            name = f"firmware.{key}"
+            _table_field(name, label, table)
+            found[name] = yamlfile.validate(_Reference, raw, f"{label}: {name}")
+    return found
 
 
 def without_sensors(vehicle: Part) -> Part:
@@ -178,7 +231,7 @@ def load_gear(design: str, gear_set: str = DEFAULT_GEAR_SET, table: Table | None
     designs = _designs(data, path.name)
     if design not in designs:
         raise ConfigError(
-            f"{path.name}: no gear {design!r}{_did_you_mean(design, designs)} (allowed {', '.join(designs)})"
+            f"{path.name}: no gear {design!r}{yamlfile.did_you_mean(design, designs)} (allowed {', '.join(designs)})"
         )
     label = f"{path.name}[{design}]"
     own = designs[design]
@@ -239,6 +292,11 @@ def check_override(name: str, value: Any, table: Table | None = None) -> float:
     return float(value)
 
 
+def unit(name: str) -> str:
+    """Unit of a parameter of the library's table."""
+    return native.library().params[name].unit
+
+
 def _locate(name_or_path: str, folder: Path, kind: str) -> Path:
     """A path is taken as given; a bare name is looked up in the package."""
     if name_or_path.endswith((".yaml", ".yml")) or "/" in name_or_path:
@@ -249,7 +307,7 @@ def _locate(name_or_path: str, folder: Path, kind: str) -> Path:
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     if name_or_path not in known:
         raise ConfigError(
-            f"no {kind} {name_or_path!r}{_did_you_mean(name_or_path, known)} (allowed {', '.join(known)})"
+            f"no {kind} {name_or_path!r}{yamlfile.did_you_mean(name_or_path, known)} (allowed {', '.join(known)})"
         )
     return folder / f"{name_or_path}.yaml"
 
@@ -310,10 +368,5 @@ def _allowed(field: native.Field) -> str:
 
 def _table_field(name: str, label: str, table: Table) -> native.Field:
     if name not in table:
-        raise ConfigError(f"{label}: {name}: unknown parameter{_did_you_mean(name, table)}")
+        raise ConfigError(f"{label}: {name}: unknown parameter{yamlfile.did_you_mean(name, table)}")
     return table[name]
-
-
-def _did_you_mean(name: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f", did you mean {close[0]!r}?" if close else ""

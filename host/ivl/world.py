@@ -99,8 +99,8 @@ class World:
 
     def __init__(
         self,
-        vehicle: str = "habas2021",
-        gear: str = "wide_short",
+        vehicle: str = model.DEFAULT_VEHICLE,
+        gear: str = model.DEFAULT_GEAR,
         gear_set: str = model.DEFAULT_GEAR_SET,
         sensing: str | None = None,
         **overrides: float,

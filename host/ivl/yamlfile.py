@@ -4,9 +4,11 @@ PyYAML reads `1e-6` as text and `1.0e-6` as a number. Text where a number belong
 converted.
 """
 
+import difflib
 import re
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -67,16 +69,54 @@ def validate(model: type[Model], data: Any, label: str) -> Model:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise ConfigError(f"{label}: {explain(error)}") from error
+        raise ConfigError(f"{label}: {explain(error, paths(model))}") from error
 
 
-def explain(error: ValidationError) -> str:
+def paths(model: type[BaseModel]) -> dict[str, bool]:
+    """Dotted path of every field of a model and of the models in it; whether a field is a mapping with free keys."""
+    found: dict[str, bool] = {}
+    for name, field in model.model_fields.items():
+        kinds = list(_kinds(field.annotation))
+        found[name] = dict in kinds
+        for kind in kinds:
+            if isinstance(kind, type) and issubclass(kind, BaseModel):
+                found |= {f"{name}.{path}": free for path, free in paths(kind).items()}
+    return found
+
+
+def _kinds(annotation: Any) -> Iterable[Any]:
+    """The types that an annotation is made of; a list is one value, whatever is in it."""
+    origin = get_origin(annotation)
+    if origin in (list, dict, None):
+        yield origin or annotation
+        return
+    for argument in get_args(annotation):
+        yield from _kinds(argument)
+
+
+def did_you_mean(name: str, known: Iterable[str], at_any_distance: bool = False) -> str:
+    """The known name that is nearest to one with a slip in it, as the end of a sentence; empty if none is near.
+
+    Args:
+        name: The name that is not known.
+        known: Those that are.
+        at_any_distance: Tell the nearest even if it is none that one would mistype so.
+    """
+    names = list(known)
+    if close := difflib.get_close_matches(name, names, n=1):
+        return f", did you mean {close[0]!r}?"
+    nearest = difflib.get_close_matches(name, names, n=1, cutoff=0.0) if at_any_distance else []
+    return f" (the nearest is {nearest[0]})" if nearest else ""
+
+
+def explain(error: ValidationError, known: Iterable[str] = ()) -> str:
     """The first problems as `field: value ...: what is wrong`, with the number of further ones.
 
-    Unknown keys come first: a name with a slip in it is what makes the right one missing.
+    Unknown keys come first: a name with a slip in it is what makes the right one missing. `known` are the paths that
+    there are, of which the nearest is offered.
     """
     problems = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
-    told = "; ".join(_complaint(problem) for problem in problems[:_N_TOLD])
+    told = "; ".join(_complaint(problem, known) for problem in problems[:_N_TOLD])
     more = f" (and {len(problems) - _N_TOLD} more)" if len(problems) > _N_TOLD else ""
     return told + more
 
@@ -88,7 +128,7 @@ def number_hint(value: Any) -> str:
     return ""
 
 
-def _complaint(problem: ErrorDetails) -> str:
+def _complaint(problem: ErrorDetails, known: Iterable[str]) -> str:
     """One problem; one of the model as a whole has no field of its own and names the field in its message."""
     kind, value, message = problem["type"], problem["input"], problem["msg"].removeprefix("Value error, ")
     field = ".".join(str(part) for part in problem["loc"])
@@ -97,7 +137,7 @@ def _complaint(problem: ErrorDetails) -> str:
     if kind == "missing":
         return f"{field}: is missing"
     if kind == "extra_forbidden":
-        return f"{field}: unknown key (value {_short(value)})"
+        return f"{field}: unknown key (value {_short(value)}){did_you_mean(field, known)}"
     return f"{field}: value {_short(value)}: {message}{number_hint(value)}"
 
 

@@ -78,6 +78,57 @@ def test_faults_of_a_set_are_named(tmp_path: Path) -> None:
         ivl.World("crazyflie21", sensing=clash)
 
 
+def number(value: float, unit: str) -> dict[str, object]:
+    return {"value": value, "unit": unit, "source": SOURCE}
+
+
+def test_a_filter_s_noise_may_be_that_of_the_sensor(tmp_path: Path) -> None:
+    firmware = {"rrev_sigma": {"from": "rrev.noise"}, "rrev_sigma_norm": number(0.3, "1")}
+    camera = write_set(tmp_path / "camera.yaml", rrev={"noise": number(0.07, "1/s")}, firmware=firmware)
+    quantity = model.load_sensors(camera).quantities["firmware.rrev_sigma"]
+    assert (quantity.value, quantity.unit, quantity.source) == (0.07, "1/s", "as rrev.noise")
+    assert ivl.World(sensing=camera).params.values["firmware.rrev_sigma"] == 0.07
+
+
+def test_a_reference_follows_the_whole_set_unless_a_number_replaces_it(tmp_path: Path) -> None:
+    camera = write_set(
+        tmp_path / "camera.yaml", rrev={"noise": number(0.07, "1/s")}, firmware={"rrev_sigma": {"from": "rrev.noise"}}
+    )
+    noisy = write_set(tmp_path / "noisy.yaml", includes=[camera], rrev={"noise": number(0.2, "1/s")})
+    fixed = write_set(tmp_path / "fixed.yaml", includes=[noisy], firmware={"rrev_sigma": number(0.1, "1/s")})
+    sigma = "firmware.rrev_sigma"
+    assert model.load_sensors(noisy).quantities[sigma].value == 0.2
+    assert model.load_sensors(fixed).quantities[sigma].value == 0.1
+    # what the vehicle really has may differ from what its filter expects
+    assert ivl.World(sensing=noisy, **{"rrev.noise": 0.5}).params.values[sigma] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("firmware", "complaint"),
+    [
+        ({"rrev_sigma": {"from": "rrev.nois"}}, r"rrev_sigma: from rrev.nois: unknown parameter.*'rrev.noise'"),
+        ({"rrev_sigma": {"from": "rrev.max"}}, r"rrev_sigma: from rrev.max: the set gives it no number"),
+        ({"rrev_sigma": {"from": "rrev.rate"}}, r"rrev_sigma: from rrev.rate: its unit is 'Hz', not '1/s'"),
+        ({"rrev_sigma": {"from": "rrev.noise", "value": 1.0}}, r"rrev_sigma: value: unknown key"),
+        ({"rrev_sigma": {"from": "firmware.rrev_sigma"}}, r"from firmware.rrev_sigma: the set gives it no number"),
+        ({"rrev_sgma": {"from": "rrev.noise"}}, r"rrev_sgma: unknown parameter, did you mean 'firmware.rrev_sigma'"),
+    ],
+)
+def test_a_reference_that_leads_nowhere_is_named(firmware: dict[str, object], complaint: str, tmp_path: Path) -> None:
+    rrev = {"noise": number(0.07, "1/s"), "rate": number(50.0, "Hz")}
+    path = write_set(tmp_path / "camera.yaml", rrev=rrev, firmware=firmware)
+    with pytest.raises(ConfigError, match=complaint) as caught:
+        model.load_sensors(path)
+    assert str(caught.value).startswith("camera.yaml: firmware.")
+
+
+@pytest.mark.parametrize("name", ["camera50_delay20", "camera100", "camera30_delay40", "camera50_ranger10"])
+def test_the_shipped_filters_expect_the_noise_and_delay_of_their_camera(name: str) -> None:
+    values = {key: quantity.value for key, quantity in model.load_sensors(name).quantities.items()}
+    assert values["firmware.rrev_sigma_norm"] == values["rrev.noise_rel"]
+    assert values["firmware.rrev_delay"] == values["rrev.delay"]
+
+
 @pytest.fixture(scope="module")
 def target() -> estimation.Cell:
     return estimation.study("accelerate_hold", "camera50_delay20", "kalman", n=600, seed=7)
@@ -114,7 +165,7 @@ def test_what_is_invalid_or_too_uncertain_never_triggers(sensors: str, estimator
 
 
 def test_a_limit_on_sigma_that_nothing_meets_keeps_the_trigger_from_firing() -> None:
-    world = estimation.make_world("accelerate_hold", "camera50", "kalman", **{"firmware.d_sigma_max": 0.01})
+    world = estimation.make_task("accelerate_hold", "camera50", "kalman", **{"firmware.d_sigma_max": 0.01}).make_world()
     out = world.rollouts(2.5, 90.0, np.full(64, 4.8), 8.0, start="flown")
     fired = out.triggered == 1
     assert (out.d_sigma_trigger_m[fired] <= 0.01 * out.d_trigger_m[fired]).all()

@@ -46,10 +46,10 @@ def make(tmp_path: Path, **changes: Any) -> Sweep:
 
 def fly(grid: Sweep | PolicyMap, run: Path, size: int, order: int = 1) -> Path:
     """Every task in this process, without a cluster: what the engine's runs are compared with."""
-    worlds = {gear: grid.make_world(gear) for gear in grid.gear_names()}
+    worlds = grid.worlds()
     folder.open_run(run, grid, worlds, size, resume=False).close()
     for task in plan.plan(grid, size)[::order]:
-        done = work.run_task(grid, worlds[task.gear], task)
+        done = work.run_task(grid, worlds[task.world], task)
         store.write_part(run, task.number, {**done.parts, "tasks": work.record(task, done)})
     return run
 

@@ -14,7 +14,8 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ivl.analysis.rates import rollouts_to_rate
-from ivl.sweep.schema import TRIAL_KEY
+from ivl.errors import ConfigError
+from ivl.sweep.schema import TRIAL_KEY, varied_columns
 
 _NAMES = ("vehicle", "gear_set", "gear", "learner")
 COUNTS = ("trial", "n_recent", "n_triggered", "n_attached", "n_check", "rollouts_to_rate")
@@ -46,7 +47,12 @@ def pack(trials: pd.DataFrame, episodes: pd.DataFrame) -> pa.Table:
     Args:
         trials: Table of trials.
         episodes: Table of episodes of the same trials; without rows, convergence is unknown.
+
+    Raises:
+        ConfigError: The sweep varies what the packed table has no column for.
     """
+    if varied := varied_columns(trials):
+        raise ConfigError(f"a packed campaign has no column {varied[0]}: pack the variants of a sweep one by one")
     keys = list(TRIAL_KEY)
     frame = trials.astype(dict.fromkeys(_NAMES, object)).sort_values(keys, ignore_index=True)
     frame["rollouts_to_rate"] = np.nan

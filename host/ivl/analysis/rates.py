@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
 from ivl.analysis.intervals import Estimate, difference, share_of, stratified_mean, wilson
-from ivl.sweep.schema import CELL
+from ivl.sweep.schema import cell_columns
 
 RATE, CLEAN_RATE = "landing_rate_four_leg_norm", "landing_rate_clean_norm"
 CHECK_RATE, CHECK_CLEAN_RATE = "check_rate_four_leg_norm", "check_rate_clean_norm"
@@ -47,12 +47,12 @@ def cell_rates(trials: pd.DataFrame, rate: str = RATE) -> pd.DataFrame:
         rate: Column with the rate of a trial.
 
     Returns:
-        One row per cell, columns of `CELL` and: `n_trials`; `rate_mean_norm` with `rate_low_norm`, `rate_high_norm`
-        (Wilson with the trials as observations, see `intervals`); `rate_best_norm` with `best_low_norm`,
-        `best_high_norm` (Wilson over the rollouts of that trial alone: to have been chosen as the best of several
-        makes it look better than it is, and no interval says by how much); `n_solved`.
+        One row per cell, columns that name it (`cell_columns`) and: `n_trials`; `rate_mean_norm` with `rate_low_norm`,
+        `rate_high_norm` (Wilson with the trials as observations, see `intervals`); `rate_best_norm` with
+        `best_low_norm`, `best_high_norm` (Wilson over the rollouts of that trial alone: to have been chosen as the best
+        of several makes it look better than it is, and no interval says by how much); `n_solved`.
     """
-    keys = list(CELL)
+    keys = cell_columns(trials)
     known = trials.loc[trials[rate].notna(), [*keys, rate, COUNT[rate]]]
     best = known.sort_values(rate, kind="stable").groupby(keys, observed=True).tail(1).set_index(keys)
     grouped = known.groupby(keys, observed=True)[rate]
@@ -69,7 +69,7 @@ def cell_rates(trials: pd.DataFrame, rate: str = RATE) -> pd.DataFrame:
 def mean_rate(trials: pd.DataFrame, rate: str = RATE) -> Estimate:
     """Mean landing rate over cells, each with the same weight, whatever its number of trials."""
     known = trials[trials[rate].notna()]
-    mean = stratified_mean(known[rate], known.groupby(list(CELL), observed=True).ngroup())
+    mean = stratified_mean(known[rate], known.groupby(cell_columns(known), observed=True).ngroup())
     low, high = np.clip([mean.low, mean.high], 0.0, 1.0)
     return Estimate(mean.value, float(low), float(high), mean.n)
 
@@ -117,7 +117,7 @@ def compare(
 def single_trial_failures(trials: pd.DataFrame, rate: str = RATE) -> TrialFailures:
     """Share of trials that end below `STUCK_RATE` where another trial of the same cell reached `SOLVED_RATE`."""
     known = trials[trials[rate].notna()]
-    best = known.groupby(list(CELL), observed=True)[rate].transform("max")
+    best = known.groupby(cell_columns(known), observed=True)[rate].transform("max")
     solvable = known.loc[best >= SOLVED_RATE, rate]
     failed = solvable < STUCK_RATE
     return TrialFailures(share_of(failed), int(failed.sum()), len(known))
@@ -132,9 +132,9 @@ def rollouts_to_rate(episodes: pd.DataFrame, rate: float = SOLVED_RATE, window: 
         window: Episodes that the rate is taken over.
 
     Returns:
-        Columns of `CELL`, `trial` and `rollouts_to_rate`: NaN if it never does.
+        Columns that name a cell, `trial` and `rollouts_to_rate`: NaN if it never does.
     """
-    keys = [*CELL, "trial"]
+    keys = [*cell_columns(episodes), "trial"]
     rows = []
     for key, trial in episodes.sort_values("episode").groupby(keys, observed=True):
         n = trial["n_scored"].to_numpy()

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from ivl import experiment
 from ivl.cli import console
 from ivl.errors import IvlError, LinkError
 from ivl.links import pil
@@ -32,6 +33,7 @@ Examples:
       also a software vehicle over UDP: landings a second, how long the paper's experiment takes to learn,
       and how fast it runs freely while cflib logs
 """
+_EXPERIMENT = "experiments/paper_vertical.yaml"
 _MUJOCO_BENCH = Path(__file__).parents[3] / "tests" / "mujoco" / "bench.py"
 
 
@@ -44,7 +46,7 @@ def bench(
 ) -> None:
     """Measure speed; HELP is the text that people see."""
     compare = _mujoco_rate() if mujoco else None
-    result = measure(World("habas2021", "wide_short", "as_simulated"), n)
+    result = measure(experiment.load(_EXPERIMENT).make_world(), n)
     result["ratio_to_mujoco"] = result["rollouts_per_s_per_core"] / compare() if compare else None
     if on_chip:
         result |= pil.measure()

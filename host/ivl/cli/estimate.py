@@ -7,17 +7,18 @@ import typer
 from rich.progress import track
 from rich.table import Table
 
-from ivl import estimation
+from ivl import estimation, model
 from ivl.cli import console
 from ivl.cli.console import number, percent
 from ivl.errors import ConfigError
 from ivl.sensing import APPROACHES, ESTIMATORS
+from ivl.task import Task
 
 HELP = """Show how well the flight core knows the distance of the ceiling.
 
-Landings start from a hover and are judged at the trigger. Error is |d - true d| / true d; NEES is the mean of
-(error / sigma)^2, 1 for an honest sigma; cover is the share of errors within two sigma; valid is the share of the
-approach with a valid distance.
+Landing gear, speed and angle are those of experiments/paper_vertical.yaml. Landings start from a hover and are judged
+at the trigger. Error is |d - true d| / true d; NEES is the mean of (error / sigma)^2, 1 for an honest sigma; cover is
+the share of errors within two sigma; valid is the share of the approach with a valid distance.
 
 \\b
 Examples:
@@ -43,7 +44,7 @@ def estimate(
     everything: Annotated[bool, typer.Option("--all", help="Every combination that makes sense.")] = False,
     runs: Annotated[int, typer.Option(help="Rollouts of each combination.", min=1, max=1_000_000)] = 300,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.", min=0)] = 0,
-    vehicle: Annotated[str, typer.Option(help="Vehicle; see `ivl list vehicles`.")] = "habas2021",
+    vehicle: Annotated[str, typer.Option(help=f"{Task.model_fields['vehicle'].description}")] = model.DEFAULT_VEHICLE,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Judge the estimated distance; HELP is the text that people see."""

@@ -1,16 +1,16 @@
 """`ivl rollout`."""
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from ivl import model, outcome, tracefile
+from ivl import outcome, tracefile, yamlfile
 from ivl.cli import console
+from ivl.cli.task_options import EQUIPMENT, FLAGS, Chosen, task_options
 from ivl.errors import ConfigError
-from ivl.experiment import parse_setting
+from ivl.landing import LandingSpec
 from ivl.reward import RewardOptions, paper
 from ivl.world import Trace, World
 
@@ -26,38 +26,19 @@ Examples:
       the whole time series, and the outcome for a script
   ivl rollout --vehicle crazyflie21 --speed 2.5 --angle 90 --rrev 6 --moment 8 --set sense.latency=0.02
       another vehicle, slower sensing
+  ivl rollout --experiment experiments/paper_vertical.yaml --rrev 4.8 --moment 8
+      the landing that an experiment learns; without it the legs are those of table1, which were built and flown
 """
-_TRACE_PERIOD_S = 0.001
 
 
-class Start(StrEnum):
-    """How a rollout starts."""
-
-    IMPARTED = "imparted"
-    FLOWN = "flown"
-    AT_TRIGGER = "at_trigger"
-
-
+@task_options(*EQUIPMENT, "speed_mps", "angle_deg", "start")
 def rollout(
-    speed: Annotated[float, typer.Option(help="Approach speed, m/s.")],
-    angle: Annotated[float, typer.Option(help="Approach angle above the horizontal, degrees.")],
+    chosen: Chosen,
     rrev: Annotated[float, typer.Option(help="Trigger threshold RREV_c, 1/s.")],
     moment: Annotated[float, typer.Option(help="Flip moment M_yd, N mm (magnitude, nose up).")],
-    gear: Annotated[str, typer.Option(help="Landing gear; see `ivl list gears`.")] = "wide_short",
-    gear_set: Annotated[str, typer.Option(help="Set of landing gears.")] = model.DEFAULT_GEAR_SET,
-    vehicle: Annotated[str, typer.Option(help="Vehicle; see `ivl list vehicles`.")] = "habas2021",
-    sensors: Annotated[
-        str | None, typer.Option(help="Sensor set in place of the vehicle's own sensing; see `ivl list sensors`.")
-    ] = None,
-    start: Annotated[
-        Start, typer.Option(help="At the approach velocity, from hover, or at the trigger.")
-    ] = Start.IMPARTED,
-    distance: Annotated[float | None, typer.Option(help="Distance to the ceiling at the start, m.")] = None,
+    distance: Annotated[float | None, typer.Option(help=f"{LandingSpec.model_fields['d_ceil_m'].description}")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.", min=0)] = 0,
     stream: Annotated[int, typer.Option(help="Number of the rollout within the seed.", min=0)] = 0,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="A.B=C", help="Change a parameter of the world.")
-    ] = None,
     trace: Annotated[Path | None, typer.Option(help="Write the time series to FILE (.csv or .npz).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the landing into FILE (.png, .svg or .pdf).")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
@@ -67,11 +48,13 @@ def rollout(
         tracefile.check_suffix(trace)
     if plot and plot.suffix not in (".png", ".svg", ".pdf"):
         raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
-    overrides = dict(parse_setting(text) for text in settings or [])
-    world = World(vehicle, gear, gear_set, sensors, **overrides)
-    flight = world.trace(
-        speed, angle, rrev, moment, seed, start.value, distance, stream=stream, period_s=_TRACE_PERIOD_S
-    )
+    policy = {"rrev_c_per_s": rrev, "moment_y_Nmm": moment}
+    numbers = {"seed": seed, "stream": stream, "d_ceil_m": distance}
+    data = chosen.fields()
+    for name in ("speed_mps", "angle_deg"):
+        if name not in data:
+            raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which says it)")
+    world, flight = yamlfile.validate(LandingSpec, {**data, **policy, **numbers}, "options").fly()
     if trace:
         tracefile.write(trace, flight.rows)
     if plot:

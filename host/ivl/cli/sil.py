@@ -7,11 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ivl import model
 from ivl.cli import console
-from ivl.experiment import load, parse_setting
+from ivl.cli.task_options import EQUIPMENT, Chosen, task_options
 from ivl.silproc import model_text, server_path
-from ivl.world import World
 
 HELP = """Start the software vehicle: a CRTP server on UDP.
 
@@ -35,14 +33,9 @@ Examples:
 """
 
 
+@task_options(*EQUIPMENT)
 def sil(
-    vehicle: Annotated[str | None, typer.Option(help="Vehicle; see `ivl list vehicles`.  [default: habas2021]")] = None,
-    gear: Annotated[str | None, typer.Option(help="Landing gear; see `ivl list gears`.  [default: wide_short]")] = None,
-    gear_set: Annotated[str | None, typer.Option(help="Set of landing gears.  [default: table1]")] = None,
-    experiment: Annotated[str | None, typer.Option(help="Vehicle, gear and settings of an experiment.")] = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="A.B=C", help="Change a parameter of the world.")
-    ] = None,
+    chosen: Chosen,
     port: Annotated[int, typer.Option(help="UDP port of the first vehicle; 0 takes a free one.")] = 19850,
     bind: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 lets everybody fly.")] = "127.0.0.1",
     vehicles: Annotated[int, typer.Option(help="How many, on consecutive ports.")] = 1,
@@ -55,7 +48,7 @@ def sil(
     write_model: Annotated[Path | None, typer.Option(help="Write the parameters to FILE and stop.")] = None,
 ) -> None:
     """Start the software vehicle; HELP is the text that people see."""
-    world = _world(vehicle, gear, gear_set, experiment, settings or [])
+    world = chosen.make_world()
     text = model_text(world)
     if write_model is not None:
         write_model.write_text(text, encoding="ascii")
@@ -70,15 +63,6 @@ def sil(
         f"{world.vehicle} with gear {world.gear} of {world.gear_set}; Ctrl-C stops", highlight=False, soft_wrap=True
     )
     _become(command, text)
-
-
-def _world(
-    vehicle: str | None, gear: str | None, gear_set: str | None, experiment: str | None, rest: list[str]
-) -> World:
-    if experiment is not None:
-        return load(experiment, rest, vehicle=vehicle, gear=gear, gear_set=gear_set).make_world()
-    overrides = dict(parse_setting(text) for text in rest)
-    return World(vehicle or "habas2021", gear or "wide_short", gear_set or model.DEFAULT_GEAR_SET, **overrides)
 
 
 def _become(command: list[str], text: str) -> None:

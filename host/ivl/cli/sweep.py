@@ -25,6 +25,11 @@ Examples:
       the paper's campaign with another learner, on all processors of this machine
   ivl sweep sweeps/paper.yaml --set gear_set=table1 --set trials=1
       other landing gears, one trial per cell
+  ivl sweep sweeps/smoke.yaml --set sensing=camera50 --set estimator=kalman --vary learner.name=ephe,bo
+      learners side by side, on the same random numbers, with an upward camera; any field of an experiment and any
+      parameter of the world can be varied
+  ivl sweep sweeps/smoke.yaml --vary sense.latency=0.0,0.01,0.02 --vary gear=wide_short
+      one landing gear, three latencies
   ivl sweep sweeps/paper.yaml --out runs/mine --resume
       go on after Ctrl-C, kill -9 or power loss; trials that failed are flown again
   ivl sweep sweeps/paper.yaml --scheduler tcp://10.0.0.1:8786
@@ -57,6 +62,10 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="A.B=C", help="Change a field of the file or a parameter of the world."),
 ]
+Vary = Annotated[
+    list[str] | None,
+    typer.Option("--vary", metavar="A.B=X,Y", help="Fly every value of a field, in place of what the file says of it."),
+]
 TaskSize = Annotated[int | None, typer.Option(help="Trials per task; default: as fits the workers.", min=1, max=10_000)]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be flown, and stop.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")]
@@ -70,6 +79,7 @@ def sweep(
     workers: Workers = None,
     learner: Annotated[str | None, typer.Option(help="Learner by name; see `ivl list learners`.")] = None,
     settings: Settings = None,
+    vary: Vary = None,
     task_size: TaskSize = None,
     dry_run: DryRun = False,
     as_json: AsJson = False,
@@ -77,8 +87,8 @@ def sweep(
     """Run a sweep; HELP is the text that people see."""
     from ivl.sweep import config  # with Arrow and Dask it takes a second to load
 
-    grid = config.load_sweep(path, settings or [], learner=learner)
-    base = f"{grid.name}-{grid.gear_set}-{grid.learner.name}"
+    grid = config.load_sweep(path, settings or [], vary or [], learner=learner)
+    base = f"{grid.name}-{grid.gear_set}-{'-'.join(grid.learner_names())}"
     return _run(grid, base, "ivl sweep", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 
 
@@ -89,6 +99,7 @@ def map_(
     scheduler: Scheduler = None,
     workers: Workers = None,
     settings: Settings = None,
+    vary: Vary = None,
     task_size: TaskSize = None,
     dry_run: DryRun = False,
     as_json: AsJson = False,
@@ -96,7 +107,7 @@ def map_(
     """Fly a policy map; MAP_HELP is the text that people see."""
     from ivl.sweep import config
 
-    grid = config.load_map(path, settings or [])
+    grid = config.load_map(path, settings or [], vary or [])
     base = f"{grid.name}-{grid.gear_set}"
     return _run(grid, base, "ivl map", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 
@@ -182,7 +193,15 @@ def _print(report: dict[str, Any], as_json: bool) -> None:
     if as_json:
         console.print_json(report)
         return
-    for name, value in report.items():
+    groups = report.get("groups", [])
+    _print_lines({name: value for name, value in report.items() if name != "groups"})
+    for group in groups:
+        console.out.print()
+        _print_lines({name: "null" if value is None else value for name, value in group.items()})
+
+
+def _print_lines(values: dict[str, Any]) -> None:
+    for name, value in values.items():
         console.out.print(f"{name.replace('_', ' '):34s} {_text(value)}", highlight=False, soft_wrap=True)
 
 
@@ -193,5 +212,5 @@ def _text(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(str, value))
     if isinstance(value, dict):
-        return ", ".join(f"{name} {each}" for name, each in value.items())
+        return ", ".join(f"{name} {_text(each)}" for name, each in value.items())
     return str(value)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ivl import campaign, landing, model, native
+from ivl import campaign, landing, native
 from ivl.errors import ConfigError, StoreError
 from ivl.export.flight import Flight, of_file, of_spec
 from ivl.landing import LandingSpec
@@ -59,8 +59,8 @@ def resolve(source: Path, choice: Choice) -> Flight:
     if source.suffix not in (".csv", ".npz"):
         raise ConfigError(f"{source}: unknown kind of file (allowed a run folder, .yaml, .csv, .npz)")
     _allow(choice, ("vehicle", "gear", "gear_set"), f"{source.name} is a recorded landing")
-    world = World(choice.vehicle or "habas2021", choice.gear or "wide_short", choice.gear_set or model.DEFAULT_GEAR_SET)
-    return of_file(source, world)
+    shapes = {name: value for name in ("vehicle", "gear", "gear_set") if (value := getattr(choice, name)) is not None}
+    return of_file(source, World(**shapes))
 
 
 def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str]:
@@ -102,7 +102,8 @@ def _of_sweep(folder: Path, choice: Choice) -> tuple[LandingSpec, str]:
     if flown.empty:
         raise StoreError(f"{folder}: no trial of this choice has a landing")
     trial = flown.loc[flown["best_reward"].idxmax()]
-    return best_landing(load_sweep(str(folder / "sweep.yaml")), trial), label(trial)
+    sweep = load_sweep(str(folder / "sweep.yaml"))
+    return best_landing(sweep, trial), label(trial, sweep)
 
 
 def _allow(choice: Choice, names: tuple[str, ...], why: str) -> None:

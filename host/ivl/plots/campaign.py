@@ -19,6 +19,7 @@ from ivl.analysis.separability import separability
 from ivl.errors import ConfigError
 from ivl.plots import style
 from ivl.sweep import store
+from ivl.sweep.schema import VARIED, varied_columns
 
 RATE_MAP = "cividis_r"
 """Landing rate: even in lightness, the same to readers with and without colour vision; much ink is much success."""
@@ -32,7 +33,12 @@ LABELS = {
     "speed_mps": "$V$ (m/s)",
     "angle_deg": r"$\varphi$ (°)",
 }
-_PREFERRED = {"vehicle": "habas2021", "gear_set": model.DEFAULT_GEAR_SET, "gear": "wide_short", "learner": "bo"}
+_PREFERRED = {
+    "vehicle": model.DEFAULT_VEHICLE,
+    "gear_set": model.DEFAULT_GEAR_SET,
+    "gear": model.DEFAULT_GEAR,
+    "learner": "bo",
+}
 SETUP = tuple(_PREFERRED)
 
 
@@ -86,13 +92,16 @@ def load(runs: Sequence[Path]) -> Campaign:
 
     Raises:
         StoreError: One holds no sweep.
-        ConfigError: One is a policy map, or holds no finished trial.
+        ConfigError: One is a policy map, varies what no figure shows, or holds no finished trial.
     """
     trials, episodes = [], []
     for run in runs:
         if "sweep" not in store.read_manifest(run):
             raise ConfigError(f"{run}: is a policy map; figures are drawn of runs of `ivl sweep`")
         trials.append(_plain(store.read_trials(run)))
+        if varied := varied_columns(trials[-1]):
+            paths = ", ".join(name.removeprefix(VARIED) for name in varied)
+            raise ConfigError(f"{run}: varies {paths}, which the figures do not tell apart (`ivl report` does)")
         episodes.append(_plain(store.read_episodes(run)))
         if trials[-1].empty:
             raise ConfigError(f"{run}: holds no finished trial")

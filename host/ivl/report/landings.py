@@ -25,6 +25,7 @@ class Album:
     geometry: dict[str, dict[str, Any]] = field(default_factory=dict)
     n_different: int = 0
     _worlds: dict[Key, World] = field(default_factory=dict)
+    _names: dict[Key, str] = field(default_factory=dict)
 
     def add(self, spec: LandingSpec, label: str, as_recorded: Callable[[Any], bool]) -> int:
         """Fly a landing and return its number.
@@ -37,8 +38,7 @@ class Album:
         world = self._world(spec)
         _, trace = spec.fly(world)
         self.n_different += not as_recorded(trace.outcome)
-        name = f"{spec.vehicle}/{spec.gear_set}/{spec.gear}"
-        self.landings.append({"label": label, "geometry": name, **replay.pack(spec, world, trace)})
+        self.landings.append({"label": label, "geometry": self._names[_key(spec)], **replay.pack(spec, world, trace)})
         return len(self.landings) - 1
 
     def fact(self) -> list[str]:
@@ -48,11 +48,22 @@ class Album:
         return ["Landings to replay", f"{n}, flown again, {verdict}"]
 
     def _world(self, spec: LandingSpec) -> World:
-        key = (spec.vehicle, spec.gear_set, spec.gear, *sorted(spec.overrides.items()))
+        key = _key(spec)
         if key not in self._worlds:
             world = self._worlds[key] = spec.make_world()
-            self.geometry[f"{spec.vehicle}/{spec.gear_set}/{spec.gear}"] = replay.geometry(world)
+            self._names[key] = self._name_of(f"{spec.vehicle}/{spec.gear_set}/{spec.gear}", replay.geometry(world))
         return self._worlds[key]
+
+    def _name_of(self, name: str, shapes: dict[str, Any]) -> str:
+        """The name under which the page finds these shapes; worlds of the same vehicle and gear may differ in them."""
+        number = 1
+        while self.geometry.setdefault(name if number == 1 else f"{name} {number}", shapes) != shapes:
+            number += 1
+        return name if number == 1 else f"{name} {number}"
+
+
+def _key(spec: LandingSpec) -> Key:
+    return (spec.vehicle, spec.gear_set, spec.gear, spec.sensing, *sorted(spec.world_settings().items()))
 
 
 def thinned(wanted: Iterable[int], n_max: int) -> set[int]:

@@ -17,11 +17,12 @@ from ivl.report.landings import Album, thinned
 from ivl.report.page import encode, flatten, learner_words
 from ivl.sweep import store
 from ivl.sweep.config import Sweep, load_sweep
-from ivl.sweep.schema import CELL, TRIAL_KEY
+from ivl.sweep.schema import cell_columns, varied_columns
+from ivl.sweep.vary import AXES, text_of
 
 CAMPAIGN_GEARS, CAMPAIGN_APPROACHES = 6, 100
 """A run with fewer gears or approaches says nothing about the paper's claims (which rest on 6 and 240)."""
-_PLACES = {"gear": "gears", "speed_mps": "speeds", "angle_deg": "angles"}
+_PLACES = {"group": "gear", "speed_mps": "speed", "angle_deg": "angle"}
 _PARAMETERS = {"rrev": "rrev_c_per_s", "moment": "moment_y_Nmm"}
 
 
@@ -32,7 +33,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
         StoreError: The folder holds no sweep, or none of its trials is finished.
     """
     manifest, sweep = store.read_manifest(folder), load_sweep(str(folder / "sweep.yaml"))
-    trials, cells = _tables(folder)
+    trials, cells = _tables(folder, sweep)
     album = Album()
     trials["landing"] = _fly(sweep, trials, album, n_landings_max, on_landing)
     data = {
@@ -49,16 +50,28 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
     return data, album
 
 
-def _tables(folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+def _tables(folder: Path, sweep: Sweep) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Trials (with the number of their cell) and cells, both in the order of their names."""
     trials = store.read_trials(folder)
     if trials.empty:
         raise StoreError(f"{folder}: none of its trials is finished, there is nothing to report")
-    names = {name: object for name in CELL if isinstance(trials[name].dtype, pd.CategoricalDtype)}
+    keys = cell_columns(trials)
+    names = {name: object for name in keys if isinstance(trials[name].dtype, pd.CategoricalDtype)}
     trials = trials.astype(names)
-    cells = cell_rates(trials).sort_values(list(CELL), kind="stable").reset_index(drop=True)
-    trials = trials.merge(cells[list(CELL)].assign(cell=np.arange(len(cells))), on=list(CELL), how="inner")
-    return trials.sort_values(list(TRIAL_KEY), kind="stable").reset_index(drop=True), cells
+    cells = cell_rates(trials).sort_values(keys, kind="stable").reset_index(drop=True)
+    cells["group"] = [_group(sweep, cell) for _, cell in cells.iterrows()]
+    trials = trials.merge(cells[keys].assign(cell=np.arange(len(cells))), on=keys, how="inner")
+    return trials.sort_values([*keys, "trial"], kind="stable").reset_index(drop=True), cells
+
+
+def _group(sweep: Sweep, row: pd.Series) -> str:
+    """What the page shows side by side: a landing gear, with the value of each varied path if there are some."""
+    return ", ".join([row["gear"], *_varied_words(sweep, row)])
+
+
+def _varied_words(sweep: Sweep, row: pd.Series) -> list[str]:
+    """Path and value of whatever the sweep varies but gear, speed and angle."""
+    return [f"{path} {text_of(value)}" for path, value in sweep.variant_of(row)]
 
 
 def _fly(
@@ -73,29 +86,26 @@ def _fly(
     numbers = pd.Series(-1, index=trials.index)
     for done, row in enumerate(sorted(chosen), 1):
         trial = trials.loc[row]
-        numbers[row] = album.add(best_landing(sweep, trial), label(trial), _is_recorded(sweep, trial))
+        numbers[row] = album.add(best_landing(sweep, trial), label(trial, sweep), _is_recorded(sweep, trial))
         on_landing(done, len(chosen))
     return numbers
 
 
-def label(trial: pd.Series) -> str:
+def label(trial: pd.Series, sweep: Sweep) -> str:
     """What people call a trial."""
-    gear = trial["gear"].replace("_", " ")
-    return f"{gear}, {trial['speed_mps']:g} m/s at {trial['angle_deg']:g}°, trial {trial['trial']}"
+    group = ", ".join([trial["gear"].replace("_", " "), *_varied_words(sweep, trial)])
+    return f"{group}, {trial['speed_mps']:g} m/s at {trial['angle_deg']:g}°, trial {trial['trial']}"
 
 
 def best_landing(sweep: Sweep, trial: pd.Series) -> LandingSpec:
     """The rollout of a trial with the largest return."""
     return LandingSpec(
-        vehicle=trial["vehicle"],
+        **sweep.at(sweep.variant_of(trial)).setup(),
         gear=trial["gear"],
-        gear_set=trial["gear_set"],
-        overrides={name: setting.value for name, setting in sweep.overrides.items()},
         speed_mps=float(trial["speed_mps"]),
         angle_deg=float(trial["angle_deg"]),
         rrev_c_per_s=float(trial["best_rrev_c_per_s"]),
         moment_y_Nmm=float(trial["best_moment_y_Nmm"]),
-        start=sweep.start,
         seed=int(trial["seed"]),
         stream=int(trial["best_stream"]),
     )
@@ -103,9 +113,10 @@ def best_landing(sweep: Sweep, trial: pd.Series) -> LandingSpec:
 
 def _is_recorded(sweep: Sweep, trial: pd.Series) -> Callable[[Any], bool]:
     """Whether an outcome has the return, feet and body contact that the table of trials tells, exactly."""
+    scored = sweep.at(sweep.variant_of(trial)).reward
 
     def same(record: Any) -> bool:
-        terms = reward.by_name(sweep.reward.name)(np.array([record], dtype=record.dtype), sweep.reward.options)
+        terms = reward.by_name(scored.name)(np.array([record], dtype=record.dtype), scored.options)
         found = (float(terms.total[0]), int(record["n_legs"]), int(record["body_contact"]))
         return found == (trial["best_reward"], trial["best_n_legs"], trial["best_body_contact"])
 
@@ -114,9 +125,11 @@ def _is_recorded(sweep: Sweep, trial: pd.Series) -> Callable[[Any], bool]:
 
 def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list[str]]:
     n_solved = int((cells["rate_best_norm"] >= SOLVED_RATE).sum())
+    varied = [f"{path}: {', '.join(map(text_of, given))}" for path, given in sweep.vary.items() if path not in AXES]
     return [
         ["Vehicle and gears", f"{sweep.vehicle}, {sweep.gear_set}"],
-        ["Learner", learner_words(sweep.learner.name)],
+        *([["Varied", "; ".join(varied)]] if varied else []),
+        ["Learner", ", ".join(learner_words(name) for name in sweep.learner_names())],
         ["Cells and trials", f"{len(cells)} cells, {_finished(sweep, trials)} trials"],
         ["Rollouts", f"{int(trials['n_rollouts'].sum()):,}"],
         ["Mean landing rate", f"{100 * cells['rate_mean_norm'].mean():.1f} %"],
@@ -126,24 +139,26 @@ def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list
 
 
 def _claims(folder: Path, trials: pd.DataFrame, cells: pd.DataFrame) -> dict[str, Any] | None:
-    """The paper's claims tried on this run; None for a run that is not nearly the paper's campaign."""
+    """The paper's claims tried on this run; None for a run that is not nearly the paper's campaign, or several."""
     approaches = cells.groupby("gear", observed=True).size()
-    if len(approaches) < CAMPAIGN_GEARS or approaches.min() < CAMPAIGN_APPROACHES:
+    several = varied_columns(cells) or any(cells[name].nunique() > 1 for name in ("vehicle", "gear_set", "learner"))
+    if several or len(approaches) < CAMPAIGN_GEARS or approaches.min() < CAMPAIGN_APPROACHES:
         return None
-    needed = rollouts_to_rate(store.read_episodes(folder)).astype({name: trials[name].dtype for name in CELL})
-    found = evaluate(trials.merge(needed, on=list(TRIAL_KEY), how="left"))
+    keys = cell_columns(trials)
+    needed = rollouts_to_rate(store.read_episodes(folder)).astype({name: trials[name].dtype for name in keys})
+    found = evaluate(trials.merge(needed, on=[*keys, "trial"], how="left"))
     head = ["", "claim of the paper", "verdict", "what was found"]
     return {"head": head, "rows": [[str(c.number), c.text, c.verdict, c.finding] for c in found]}
 
 
 def _finished(sweep: Sweep, trials: pd.DataFrame) -> str:
     """Number of trials, and of how many if some are missing."""
-    n_planned = len(sweep.approaches()) * len(sweep.gear_names()) * sweep.trials
+    n_planned = len(sweep.approaches()) * sweep.n_gears() * sweep.trials
     return str(len(trials)) if len(trials) == n_planned else f"{len(trials)} of {n_planned}"
 
 
 def _places(cells: pd.DataFrame) -> dict[str, list[Any]]:
-    """Values of gear, speed and angle that occur; the gears in the order of their legs' width and length."""
+    """Values of gear (with what else is varied), speed and angle that occur; gears by their legs' length and width."""
     return {name: sorted(cells[name].unique().tolist(), key=_gear_order) for name in _PLACES}
 
 
@@ -157,18 +172,21 @@ def _gear_order(value: Any) -> tuple[Any, ...]:
 
 def _episodes(folder: Path, sweep: Sweep, trials: pd.DataFrame) -> dict[str, Any]:
     """The search of every trial, one after the other, each beginning with its start; adds to `trials` where it is."""
-    keys = list(TRIAL_KEY)
-    episodes = store.read_episodes(folder).astype({name: trials[name].dtype for name in CELL})
+    keys = [*cell_columns(trials), "trial"]
+    episodes = store.read_episodes(folder).astype({name: trials[name].dtype for name in keys})
+    grids = {varied: sweep.at(varied) for varied in sweep.variants()}
+    own = [grids[sweep.variant_of(trial)] for _, trial in trials.iterrows()]
     start = trials[keys].assign(episode=-1, rate=np.nan, reward=np.nan)
     for parameter in _PARAMETERS.values():
         start[f"mu_{parameter}"] = trials[f"mu0_{parameter}"]
-        start[f"sigma_{parameter}"] = getattr(sweep.policy, parameter).sigma0
+        start[f"sigma_{parameter}"] = [getattr(grid.policy, parameter).sigma0 for grid in own]
     episodes = episodes.rename(columns={RATE: "rate", "reward_mean": "reward"})
     both = pd.concat([start, episodes[start.columns]]).sort_values([*keys, "episode"], kind="stable")
+    both = both.merge(trials[keys].assign(n_rollouts=[grid.n_rollouts for grid in own]), on=keys, how="left")
     trials["n_episodes_shown"] = 1 + trials["n_episodes"]
     trials["first_episode"] = trials["n_episodes_shown"].cumsum() - trials["n_episodes_shown"]
     return {
-        "at": encode((both["episode"] + 1) * sweep.n_rollouts, 1.0),
+        "at": encode((both["episode"] + 1) * both["n_rollouts"], 1.0),
         "mu": [encode(both[f"mu_{name}"], 1e-2) for name in _PARAMETERS.values()],
         "sigma": [encode(both[f"sigma_{name}"], 1e-2) for name in _PARAMETERS.values()],
         "rate": encode(both["rate"], 1e-2),
@@ -182,9 +200,9 @@ def _encode(
     best = trials[trials["landing"] >= 0].groupby("cell")["best_reward"].idxmax()
     landing = trials.loc[best].set_index("cell")["landing"].reindex(cells.index, fill_value=-1)
     return {
-        **{stored: places[name] for name, stored in _PLACES.items()},
+        **{f"{short}s": places[name] for name, short in _PLACES.items()},
         "cells": {
-            **{name.split("_")[0]: [places[name].index(v) for v in cells[name]] for name in _PLACES},
+            **{short: [places[name].index(v) for v in cells[name]] for name, short in _PLACES.items()},
             "rate": encode(cells["rate_mean_norm"], 1e-3),
             "lo": encode(cells["rate_low_norm"], 1e-3),
             "hi": encode(cells["rate_high_norm"], 1e-3),
@@ -212,6 +230,7 @@ def _encode_trials(trials: pd.DataFrame) -> dict[str, Any]:
 
 def _limits(sweep: Sweep, trials: pd.DataFrame, name: str) -> list[float]:
     """Range of a parameter's axis: bounds, and wherever a search ended."""
-    bounds = getattr(sweep.policy, name).bounds
-    lo, hi = min(bounds[0], trials[f"mu_{name}"].min()), max(bounds[1], trials[f"mu_{name}"].max())
+    bounds = [getattr(sweep.at(varied).policy, name).bounds for varied in sweep.variants()]
+    lo, hi = trials[f"mu_{name}"].min(), trials[f"mu_{name}"].max()
+    lo, hi = min([lo, *(each[0] for each in bounds)]), max([hi, *(each[1] for each in bounds)])
     return [float(lo - 0.03 * (hi - lo)), float(hi + 0.03 * (hi - lo))]

@@ -1,94 +1,200 @@
-"""Sweep files: what is flown over a grid of approaches and landing gears; YAML in, one checked object out.
+"""Sweep files: a task, and the paths of it that are varied; YAML in, one checked object out.
 
-    sweep = load_sweep("sweeps/paper.yaml", ["gear_set=table1"], learner="ephe")
+    sweep = load_sweep("sweeps/paper.yaml", ["gear_set=table1"], ["learner.name=ephe,bo", "sensing=camera50,mocap"])
 
-A trial's random numbers follow from its name alone (`trial_seed`), so that results do not depend on how trials are
+Any field of an experiment and any parameter of the world can be varied (`vary: {sense.latency: [0.0, 0.02]}`); gears,
+speeds and angles have short fields of their own. A *variant* is one value of each varied path but these three;
+`Sweep.at` gives the sweep with the values in their fields.
+
+A trial's random numbers follow from its name alone (`Sweep.run_seed`), so that results do not depend on how trials are
 grouped, where and in which order they run, or how often a run was cut off. The learner is not part of the name: trials
 of two learners are paired, like the seeds of `ivl learn`, and `ivl learn --seed RUN_SEED` repeats a trial.
 """
 
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from ivl import experiment, model, native, yamlfile
 from ivl.errors import ConfigError, LearnerError
-from ivl.experiment import POLICY, Bounds, Experiment, Finite, LearnerChoice, Policy, RewardChoice, Setting, Strict
+from ivl.experiment import POLICY, Bounds, Experiment, LearnerChoice, Named, Policy, RewardChoice
 from ivl.seeds import Purpose, derive, derive_from_key
+from ivl.settings import (
+    PACKAGE_DIR,
+    Finite,
+    Strict,
+    apply_setting,
+    check_overrides,
+    check_path,
+    locate,
+    parse_setting,
+    put,
+    read_mapping,
+)
+from ivl.sweep.schema import column_of
+from ivl.sweep.vary import (
+    AXES,
+    COUNT_MAX,
+    Axis,
+    Value,
+    Varied,
+    apply_vary,
+    as_cell,
+    is_flown,
+    listed,
+    refuse_varied,
+    text_of,
+    values,
+    world_name,
+)
+from ivl.task import Setup, Task
 from ivl.world import World
 
-SWEEPS_DIR = experiment.PACKAGE_DIR / "sweeps"
-_COUNT_MAX = 100_000
+SWEEPS_DIR = PACKAGE_DIR / "sweeps"
+_SEED_HAS = ("vehicle", "gear_set")
+"""Fields that the name of a cell contains, varied or not."""
+_NEVER_VARIED = ("name", "doc", "seed", "check", "flown", "overrides")
+"""Fields of an experiment that say nothing of a single cell; overrides are varied by the parameter's own path."""
 
 Grid = TypeVar("Grid", bound="_Grid")
 
 
-class Range(Strict):
-    """Equally spaced values, both ends included."""
+class _Grid(Setup, Named):
+    """What a sweep and a map have in common: a task, and the paths that are varied."""
 
-    first: Finite
-    last: Finite
-    count: int = Field(ge=1, le=_COUNT_MAX)
-
-
-Axis = Annotated[list[Finite], Field(min_length=1, max_length=_COUNT_MAX)] | Range
-
-
-def values(axis: list[float] | Range) -> list[float]:
-    """The values of an axis, rounded to what a person would have typed."""
-    if isinstance(axis, Range):
-        return [round(float(x), 9) for x in np.linspace(axis.first, axis.last, axis.count)]
-    return [float(x) for x in axis]
-
-
-class _Grid(Strict):
-    """What a sweep and a map have in common: landing gears and approaches."""
-
-    name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$")
-    doc: str = Field(min_length=1)
-    vehicle: str
-    gear_set: str = model.DEFAULT_GEAR_SET
-    gears: list[str] | None = Field(default=None, min_length=1, description="designs of the gear set; null: all")
-    speeds_mps: Axis
-    angles_deg: Axis
-    overrides: dict[str, Setting] = Field(default_factory=dict)
+    gear: str | None = Field(default=None, description="the only landing gear; null: those of the other fields")
+    speed_mps: Finite | None = Field(default=None, description="the only speed")
+    angle_deg: Finite | None = Field(default=None, description="the only angle")
+    gears: list[str] | None = Field(default=None, min_length=1, description="short for vary.gear; null: all of the set")
+    speeds_mps: Axis | None = Field(default=None, description="short for vary.speed_mps")
+    angles_deg: Axis | None = Field(default=None, description="short for vary.angle_deg")
+    vary: dict[str, list[Value]] = Field(default_factory=dict, description="values by path, every one with every other")
     seed: int = Field(default=0, ge=0, lt=2**63)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _listed(cls, data: Any) -> Any:
+        """Write the values of varied paths as lists."""
+        if not isinstance(data, dict) or not isinstance(data.get("vary") or {}, dict):
+            return data
+        given = data.get("vary") or {}
+        return {**data, "vary": {str(path): listed(str(path), value) for path, value in given.items()}}
 
     @model_validator(mode="after")
     def _in_range(self) -> Self:
-        table = native.library().spec_fields
-        for axis in self.axes():
-            given = values(getattr(self, axis))
-            entry = table[{"speeds_mps": "speed_mps", "angles_deg": "angle_deg"}.get(axis, axis)]
-            if len(set(given)) < len(given):
-                raise ValueError(f"{axis}: a value is given twice")
-            for value in given:
-                if not entry.lo <= value <= entry.hi:
-                    raise ValueError(f"{axis}: {value!r} is out of range ({entry.lo:g} .. {entry.hi:g} {entry.unit})")
+        for path, short in AXES.items():
+            given = [name for name in (path, short) if getattr(self, name) is not None]
+            given += [f"vary.{path}"] if path in self.vary else []
+            if len(given) > 1:
+                raise ValueError(f"{path}: is given twice, by {given[0]} and by {given[1]}")
+            if path == "gear":
+                if self.gears is not None and len(set(self.gears)) < len(self.gears):
+                    raise ValueError("gears: a value is given twice")
+                continue
+            if not given:
+                raise ValueError(f"{short}: is missing (or {path} for one value, or vary.{path})")
+            self._check_axis(path, given[0], self.axis(path))
         return self
 
-    def axes(self) -> tuple[str, ...]:
-        """Names of the fields that are axes of the grid."""
-        return ("speeds_mps", "angles_deg")
+    @staticmethod
+    def _check_axis(path: str, name: str, given: list[Any]) -> None:
+        entry = native.library().spec_fields[path]
+        if len(set(given)) < len(given):
+            raise ValueError(f"{name}: a value is given twice")
+        for value in given:
+            if not isinstance(value, float):
+                raise ValueError(f"{name}: value {value!r} is not a number{yamlfile.number_hint(value)}")
+            if not entry.lo <= value <= entry.hi:
+                raise ValueError(f"{name}: {value!r} is out of range ({entry.lo:g} .. {entry.hi:g} {entry.unit})")
+
+    def axis(self, path: str) -> list[Any]:
+        """Values of one of `AXES`; none of the landing gear means all of the set."""
+        if path in self.vary:
+            return list(self.vary[path])
+        short = getattr(self, AXES[path])
+        if short is not None:
+            return list(short) if path == "gear" else values(short)
+        fixed = getattr(self, path)
+        return [] if fixed is None else [fixed]
 
     def gear_names(self) -> list[str]:
         """Designs that are flown."""
-        return list(self.gears) if self.gears is not None else model.list_gears(self.gear_set)
-
-    def make_world(self, gear: str) -> World:
-        """The world of one landing gear."""
-        overrides = {name: setting.value for name, setting in self.overrides.items()}
-        return World(self.vehicle, gear, self.gear_set, None, **overrides)
+        return self.axis("gear") or model.list_gears(self.gear_set)
 
     def approaches(self) -> list[tuple[float, float]]:
         """Speed (m/s) and angle (deg) of every cell."""
-        return [(speed, angle) for speed in values(self.speeds_mps) for angle in values(self.angles_deg)]
+        return [(speed, angle) for speed in self.axis("speed_mps") for angle in self.axis("angle_deg")]
+
+    def variants(self) -> list[Varied]:
+        """Every combination of the varied paths that are none of `AXES`; one without any path if there are none.
+
+        Tasks are numbered in this order, which for that reason does not depend on the order of the paths in a file.
+        """
+        paths = sorted(path for path in self.vary if path not in AXES)
+        return [tuple(zip(paths, chosen, strict=True)) for chosen in product(*(self.vary[path] for path in paths))]
+
+    def variant_of(self, row: Mapping[str, Any]) -> Varied:
+        """The variant of a row of the tables, by its columns.
+
+        Raises:
+            ConfigError: The sweep has no such variant.
+        """
+        for varied in self.variants():
+            if all(row[column_of(path)] == as_cell(value) for path, value in varied):
+                return varied
+        raise ConfigError(f"{self.name}: a row of its tables is of no variant of the sweep")
+
+    def n_gears(self) -> int:
+        """Landing gears of all variants together."""
+        return sum(len(self.at(varied).gear_names()) for varied in self.variants())
+
+    def at(self, varied: Varied) -> Self:
+        """The sweep or map at one value of each of `varied`: its fields have the values, `vary` names them.
+
+        Raises:
+            ConfigError: A value is wrong.
+        """
+        if not varied:
+            return self
+        data = self.model_dump()
+        data["vary"] |= {path: [value] for path, value in varied}
+        label = ", ".join(f"vary.{path}={text_of(value)}" for path, value in varied)
+        for path, value in varied:
+            put(data, path, value, "varied by the sweep", label)
+        return yamlfile.validate(type(self), data, label)
+
+    def make_world(self, gear: str) -> World:
+        """The world of one landing gear, of a sweep or map with one variant."""
+        (varied,) = self.variants()
+        return self.at(varied).world_of(gear)
+
+    def worlds(self) -> dict[str, World]:
+        """Every world that is flown in, by the name that `world_name` gives it."""
+        found: dict[str, World] = {}
+        for varied in self.variants():
+            grid = self.at(varied)
+            for gear in grid.gear_names():
+                name = world_name(gear, varied)
+                found[name] = found[name] if name in found else grid.world_of(gear)
+        return found
 
     def key(self, gear: str, speed_mps: float, angle_deg: float) -> str:
-        """Name of a cell, from which its random numbers follow."""
-        return f"{self.vehicle}|{self.gear_set}|{gear}|{speed_mps!r}|{angle_deg!r}"
+        """Name of a cell, from which its random numbers follow.
+
+        What is flown is part of it as far as it is varied; how it is learned is not, so that learners are compared on
+        the same random numbers.
+        """
+        name = f"{self.vehicle}|{self.gear_set}|{gear}|{speed_mps!r}|{angle_deg!r}"
+        for path in sorted(self.vary):
+            if path in AXES or path in _SEED_HAS or not is_flown(path):
+                continue
+            (value,) = self.vary[path]  # of one variant, see `at`
+            name += f"|{path}={value!r}"
+        return name
 
     def to_yaml(self) -> str:
         """The resolved file, every default written out."""
@@ -103,10 +209,10 @@ class StartRange(Strict):
 
 
 class Sweep(_Grid):
-    """A complete, checked sweep: one learner over all cells."""
+    """A complete, checked sweep: one learner, or each of several, over all cells."""
 
-    trials: int = Field(ge=1, le=_COUNT_MAX, description="per cell")
     start: Literal["imparted", "flown"] = "imparted"
+    trials: int = Field(ge=1, le=COUNT_MAX, description="per cell")
     policy: Policy
     mu0_range: StartRange | None = Field(default=None, description="null: every trial starts from policy.*.mu0")
     learner: LearnerChoice
@@ -134,6 +240,10 @@ class Sweep(_Grid):
         """Episodes that the budget of a trial pays for."""
         return self.budget // self.n_rollouts
 
+    def learner_names(self) -> list[str]:
+        """Learners that are compared, or the one."""
+        return [str(name) for name in self.vary.get("learner.name", [self.learner.name])]
+
     def run_seed(self, gear: str, speed_mps: float, angle_deg: float, trial: int) -> int:
         """The seed of one trial: that of the run of `ivl learn` which repeats it."""
         return derive_from_key(self.seed, f"{self.key(gear, speed_mps, angle_deg)}|{trial}")
@@ -142,15 +252,12 @@ class Sweep(_Grid):
         """The experiment that one trial is."""
         seed = self.run_seed(gear, speed_mps, angle_deg, trial)
         return Experiment(
+            **self.setup(),
             name=self.name,
             doc=self.doc,
-            vehicle=self.vehicle,
             gear=gear,
-            gear_set=self.gear_set,
             speed_mps=speed_mps,
             angle_deg=angle_deg,
-            start=self.start,
-            overrides=self.overrides,
             policy=self._policy(seed),
             learner=self.learner,
             n_rollouts=self.n_rollouts,
@@ -174,13 +281,16 @@ class Sweep(_Grid):
 class PolicyMap(_Grid):
     """A complete, checked policy map: flips commanded at once, at every point of a grid, without learning."""
 
+    start: Literal["at_trigger"] = "at_trigger"
     d_ceil_m: Axis
     moment_y_Nmm: Axis
     n_rollouts: int = Field(default=8, ge=1, le=100_000, description="per point")
 
-    def axes(self) -> tuple[str, ...]:
-        """Names of the fields that are axes of the grid."""
-        return ("speeds_mps", "angles_deg", "d_ceil_m", "moment_y_Nmm")
+    @model_validator(mode="after")
+    def _points_in_range(self) -> Self:
+        for name in ("d_ceil_m", "moment_y_Nmm"):
+            self._check_axis(name, name, values(getattr(self, name)))
+        return self
 
     def cell_seed(self, gear: str, speed_mps: float, angle_deg: float) -> int:
         """Seed of the random numbers of one cell's rollouts."""
@@ -192,32 +302,70 @@ def list_sweeps() -> list[str]:
     return [f"sweeps/{path.name}" for path in sorted(SWEEPS_DIR.glob("*.yaml"))]
 
 
-def load_sweep(path: str, settings: list[str] | None = None, **replacements: Any) -> Sweep:
-    """Read, change and check a sweep file (arguments and errors as `ivl.experiment.load`)."""
-    sweep = _load(Sweep, path, settings or [], replacements)
-    try:
-        gear, (speed_mps, angle_deg) = sweep.gear_names()[0], sweep.approaches()[0]
-        sweep.experiment(gear, speed_mps, angle_deg, trial=0).make_learner(seed=0)
-    except LearnerError as error:
-        raise ConfigError(f"{Path(path).name}: {error}") from error
+def load_sweep(path: str, settings: Sequence[str] = (), vary: Sequence[str] = (), **replacements: Any) -> Sweep:
+    """Read, change and check a sweep file.
+
+    Args:
+        path: As for `ivl.experiment.load`.
+        settings: Likewise.
+        vary: "a.b=x,y" each: values of a path, in place of what the file says of it.
+        **replacements: As for `ivl.experiment.load`.
+
+    Raises:
+        ConfigError: One line naming file, field and value.
+    """
+    sweep = _load(Sweep, Experiment, path, settings, vary, replacements)
+    for varied in sweep.variants():
+        grid = sweep.at(varied)
+        try:
+            gear, (speed_mps, angle_deg) = grid.gear_names()[0], grid.approaches()[0]
+            grid.experiment(gear, speed_mps, angle_deg, trial=0).make_learner(seed=0)
+        except LearnerError as error:
+            where = "".join(f"vary.{path}={text_of(value)}: " for path, value in varied)
+            raise ConfigError(f"{Path(path).name}: {where}{error}") from error
     return sweep
 
 
-def load_map(path: str, settings: list[str] | None = None, **replacements: Any) -> PolicyMap:
-    """Read, change and check a map file (arguments and errors as `ivl.experiment.load`)."""
-    return _load(PolicyMap, path, settings or [], replacements)
+def load_map(path: str, settings: Sequence[str] = (), vary: Sequence[str] = (), **replacements: Any) -> PolicyMap:
+    """Read, change and check a map file (arguments and errors as `load_sweep`)."""
+    return _load(PolicyMap, Task, path, settings, vary, replacements)
 
 
-def _load(kind: type[Grid], path: str, settings: list[str], replacements: dict[str, Any]) -> Grid:
-    file = experiment.locate(path, list_sweeps())
-    data = yamlfile.read(file)
-    if not isinstance(data, dict):
-        raise ConfigError(f"{file.name}: expected a mapping of fields, got {type(data).__name__}")
-    for name, value in replacements.items():
-        if value is not None:
-            data[name] = {"name": value} if name == "learner" else value
+def _load(
+    kind: type[Grid], varied: type[BaseModel], path: str, settings: Sequence[str], vary: Sequence[str],
+    replacements: dict[str, Any],
+) -> Grid:  # fmt: skip
+    """Read a file; `varied` has the fields that may be varied."""
+    file = locate(path, list_sweeps())
+    data = read_mapping(file)
+    experiment.replace(data, replacements)
+    apply_vary(data, vary, file.name)
     for setting in settings:
-        experiment.apply_setting(data, setting)
+        refuse_varied(data, parse_setting(setting)[0], f"{file.name}: --set {setting}")
+        apply_setting(data, setting, kind, file.name)
+    if replacements.get("learner") is not None:
+        refuse_varied(data, "learner.name", f"{file.name}: --learner {replacements['learner']}")
     grid = yamlfile.validate(kind, data, file.name)
-    experiment.check_overrides(grid.overrides, file.name)
+    check_overrides(grid.overrides, file.name)
+    for name in grid.vary:
+        check_path(name, varied, f"{file.name}: vary", _NEVER_VARIED)
+    try:
+        _check_variants(grid)
+    except ConfigError as error:
+        raise ConfigError(f"{file.name}: {error}") from error
     return grid
+
+
+def _check_variants(grid: _Grid) -> None:
+    """Try every variant, and the files that varied values name."""
+    read: dict[str, Callable[[str], object]] = {
+        "vehicle": model.load_vehicle, "sensing": model.load_sensors, "gear_set": model.list_gears,
+    }  # fmt: skip
+    for path in read.keys() & grid.vary.keys():
+        for name in grid.vary[path]:
+            if isinstance(name, str):
+                read[path](name)
+    for varied in grid.variants():
+        at = grid.at(varied)
+        for gear in at.vary.get("gear", ()):
+            model.load_gear(str(gear), at.gear_set)

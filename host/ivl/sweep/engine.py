@@ -107,7 +107,7 @@ def run(
         RolloutError: The scheduler is lost; the run can be resumed.
     """
     cluster.check(scheduler, workers)
-    worlds = {gear: grid.make_world(gear) for gear in grid.gear_names()}
+    worlds = grid.worlds()
     size = task_size or plan.good_size(grid, workers or cluster.processors())
     with closing(folder.open_run(run_folder, grid, worlds, size, resume)) as opened:
         tasks = plan.plan(grid, opened.task_size)
@@ -133,7 +133,7 @@ class _Session:
         on_standing: Callable[[Standing], None] | None,
     ) -> None:
         self._run, self._grid = run_folder, grid
-        self._worlds = {gear: pickle.dumps(world) for gear, world in worlds.items()}
+        self._worlds = {name: pickle.dumps(world) for name, world in worlds.items()}
         self.waiting = [task for task in tasks if task.number not in done]
         self._n_trials = sum(len(task.trials) for task in tasks)
         self._n_before = sum(len(task.trials) for task in tasks if task.number in done)
@@ -176,7 +176,7 @@ class _Session:
             future = client.submit(
                 run_packed,
                 self._grid,
-                self._worlds[task.gear],
+                self._worlds[task.world],
                 task,
                 self._library_sha256,
                 key=f"{self._grid.name}-{self._id}-{task.number}",

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import ivl
-from ivl import native
+from ivl import native, yamlfile
 from ivl.campaign import git_commit
-from ivl.errors import StoreError
+from ivl.errors import ConfigError, StoreError
 from ivl.store import lock_folder, write_durably, write_json
 from ivl.sweep import schema, store
 from ivl.sweep.config import PolicyMap, Sweep
@@ -75,12 +75,12 @@ def make_manifest(grid: Sweep | PolicyMap, worlds: Mapping[str, World], task_siz
         _kind(grid): grid.model_dump(mode="json"),
         "vehicle": grid.vehicle,
         "gear_set": grid.gear_set,
-        "gears": list(worlds),
-        "learner": grid.learner.name if isinstance(grid, Sweep) else None,
+        "gears": list(dict.fromkeys(world.gear for world in worlds.values())),
+        "learner": ", ".join(grid.learner_names()) if isinstance(grid, Sweep) else None,
         "seed": grid.seed,
         "task_size": task_size,
-        "model_sha256": {gear: world.params.digest() for gear, world in worlds.items()},
-        "parameters": {gear: _finite(world.params.values) for gear, world in worlds.items()},
+        "model_sha256": {name: world.params.digest() for name, world in worlds.items()},
+        "parameters": {name: _finite(world.params.values) for name, world in worlds.items()},
         "library_sha256": native.library().digest(),
         "ivl_version": ivl.__version__,
         "git_commit": git_commit(),
@@ -101,6 +101,14 @@ def _finite(values: Mapping[str, float]) -> dict[str, float | None]:
     return {name: value if abs(value) < float("inf") else None for name, value in values.items()}
 
 
+def _resolved(kind: str, data: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a manifest, those that its version did not have yet at their defaults."""
+    try:
+        return yamlfile.validate(PolicyMap if kind == "map" else Sweep, data, kind).model_dump(mode="json")
+    except ConfigError:
+        return data
+
+
 def _check_empty(run: Path) -> None:
     if (run / "manifest.json").exists():
         raise StoreError(f"{run}: holds a run already: continue it with --resume, or choose another --out")
@@ -113,7 +121,7 @@ def _check_same(run: Path, new: Mapping[str, Any]) -> None:
     """Refuse to mix two configurations, models or libraries in one run."""
     old = store.read_manifest(run)
     for kind in ("sweep", "map"):
-        then, now = old.get(kind) or {}, new.get(kind) or {}
+        then, now = _resolved(kind, old.get(kind) or {}), new.get(kind) or {}
         for field in sorted({*then, *now}):
             if then.get(field) != now.get(field):
                 what = f"{field}: it has {then.get(field)!r}, now {now.get(field)!r}"

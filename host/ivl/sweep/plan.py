@@ -12,6 +12,7 @@ import numpy as np
 
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.trials import Trial
+from ivl.sweep.vary import Varied, world_name
 
 TASKS_PER_WORKER = 8  # at least so many if there are trials enough, so that the last ones end together
 SIZE_MIN, SIZE_MAX = 4, 32
@@ -22,28 +23,36 @@ OVERHEAD_PER_TRIAL = 0.1
 
 @dataclass(frozen=True)
 class Task:
-    """Some trials (or map cells) of one landing gear.
+    """Some trials (or map cells) of one landing gear and one variant.
 
     Attributes:
         number: Number of the task in its run; names its files.
         gear: Landing gear.
         trials: The trials; of a map the cells, as trial 0.
+        varied: Value of each varied path.
     """
 
     number: int
     gear: str
     trials: tuple[Trial, ...]
+    varied: Varied = ()
+
+    @property
+    def world(self) -> str:
+        """Name of the world that it is flown in."""
+        return world_name(self.gear, self.varied)
 
 
 def plan(grid: Sweep | PolicyMap, size: int) -> list[Task]:
-    """All tasks, `size` trials each but for the last of a landing gear; the same for the same arguments, always."""
+    """All tasks, `size` trials each but for the last of a gear and variant; the same for the same arguments, always."""
     n_trials = grid.trials if isinstance(grid, Sweep) else 1
     names = [Trial(speed, angle, k) for speed, angle in grid.approaches() for k in range(n_trials)]
     shuffled = [names[i] for i in np.random.Generator(np.random.PCG64(0)).permutation(len(names))]
     tasks: list[Task] = []
-    for gear in grid.gear_names():
-        for part in _chunks(shuffled, size):
-            tasks.append(Task(len(tasks), gear, tuple(part)))
+    for varied in grid.variants():
+        for gear in grid.at(varied).gear_names():
+            for part in _chunks(shuffled, size):
+                tasks.append(Task(len(tasks), gear, tuple(part), varied))
     return tasks
 
 
@@ -54,7 +63,7 @@ def good_size(grid: Sweep | PolicyMap, n_workers: int) -> int:
     seconds: from k = n_workers o / t on it keeps up. Where there are too few trials for that, sqrt(n o / t) balances
     what all tasks cost the client against the length of the last one.
     """
-    n_trials = len(grid.approaches()) * len(grid.gear_names()) * (grid.trials if isinstance(grid, Sweep) else 1)
+    n_trials = len(grid.approaches()) * grid.n_gears() * (grid.trials if isinstance(grid, Sweep) else 1)
     shared = np.clip(n_trials // (TASKS_PER_WORKER * max(n_workers, 1)), SIZE_MIN, SIZE_MAX)
     kept_up = min(n_workers * OVERHEAD_PER_TRIAL, np.sqrt(n_trials * OVERHEAD_PER_TRIAL))
     return int(np.ceil(max(shared, kept_up)))

@@ -7,8 +7,9 @@ import pyarrow as pa  # type: ignore[import-untyped]
 
 from ivl.outcome import clean, four_leg, valid
 from ivl.sweep import schema, tables
-from ivl.sweep.config import PolicyMap, values
+from ivl.sweep.config import PolicyMap
 from ivl.sweep.trials import Trial
+from ivl.sweep.vary import values
 from ivl.world import World
 
 

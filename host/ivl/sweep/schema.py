@@ -9,9 +9,10 @@
     RUN/failures/*.parquet  one row per trial or map cell that could not be finished
     RUN/tasks/*.parquet     one row per finished task: what it cost
 
-Every column name ends with its unit; `_norm` is a share in 0 .. 1, a count or a number without unit has no suffix. Each
-field carries `unit` and `doc` in its metadata, each file the schema version. A quantity that does not exist (no rollout
-was triggered, no foot stuck) is NaN, never zero; nothing is null.
+A path that a sweep varies and that has no column here has one of its own, `vary.` and the path, at the end of every
+table but `tasks`. The name of every other column ends with its unit; `_norm` is a share in 0 .. 1, a count or a number
+without unit has no suffix. Each field carries `unit` and `doc` in its metadata, each file the schema version. A
+quantity that does not exist (no rollout was triggered, no foot stuck) is NaN, never zero; nothing is null.
 """
 
 from collections.abc import Iterable
@@ -30,6 +31,9 @@ KINDS = (TRIALS, EPISODES, ROLLOUTS, MAP, FAILURES, TASKS)
 CELL = ("vehicle", "gear_set", "gear", "learner", "speed_mps", "angle_deg")
 """Columns that name a cell of the sweep; with `trial` they are the key of a trial."""
 TRIAL_KEY = (*CELL, "trial")
+COLUMN_OF = {"vehicle": "vehicle", "gear_set": "gear_set", "learner.name": "learner"}
+"""Paths that a sweep may vary whose column is one of `CELL`; that of any other one begins with `VARIED`."""
+VARIED = "vary."
 
 _SUFFIX = {"1": "", "m": "m", "s": "s", "deg": "deg", "m/s": "mps", "rad/s": "radps", "1/s": "per_s"}
 _NAME, _F8, _I4, _I8 = pa.dictionary(pa.int16(), pa.string()), pa.float64(), pa.int32(), pa.int64()
@@ -38,6 +42,29 @@ _NAME, _F8, _I4, _I8 = pa.dictionary(pa.int16(), pa.string()), pa.float64(), pa.
 def field(name: str, kind: pa.DataType, unit: str, doc: str) -> pa.Field:
     """One column, with its unit and meaning."""
     return pa.field(name, kind, nullable=False, metadata={"unit": unit, "doc": doc})
+
+
+def column_of(path: str) -> str:
+    """Column of a varied path."""
+    return COLUMN_OF.get(path, f"{VARIED}{path}")
+
+
+def varied_field(path: str, number: bool) -> pa.Field:
+    """The column of a varied path: numbers, or names and other values as YAML has them."""
+    parameter = native.library().params.get(path)
+    unit = parameter.unit if parameter else "1"
+    return field(column_of(path), _F8 if number else _NAME, unit, f"value of {path}, which the sweep varies")
+
+
+def varied_columns(names: Iterable[str]) -> list[str]:
+    """Those of the columns that a sweep has because it varies something."""
+    return [str(name) for name in names if str(name).startswith(VARIED)]
+
+
+def cell_columns(names: Iterable[str]) -> list[str]:
+    """Columns that name a cell in a table with these columns: `CELL`, and whatever else the sweep varies."""
+    names = list(names)
+    return [*(name for name in CELL if name in names), *varied_columns(names)]
 
 
 def schema(kind: str) -> pa.Schema:

@@ -6,7 +6,7 @@ what is done can be read while the rest is still flown.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -60,18 +60,30 @@ def read_table(run: Path | str, kind: str) -> pa.Table:
     if kind not in KINDS:
         raise StoreError(f"{run}: no table {kind!r} (allowed {', '.join(KINDS)})")
     wanted = schema.schema(kind)
-    parts = [_read_part(path, wanted) for path in sorted((Path(run) / kind).glob("*.parquet"))]
+    paths = sorted((Path(run) / kind).glob("*.parquet"))
+    parts = [_read_part(path, wanted) for path in paths]
     if not parts:
         return wanted.empty_table()
+    varied = schema.varied_columns(parts[0].schema.names)
+    for path, part in zip(paths, parts, strict=True):
+        if schema.varied_columns(part.schema.names) != varied:
+            raise StoreError(f"{path}: other varied paths than in {paths[0].name}: {', '.join(varied) or 'none'} there")
+    wanted = pa.schema([*wanted, *(parts[0].schema.field(name) for name in varied)], metadata=wanted.metadata)
     plain = pa.schema([f.with_type(pa.string()) if pa.types.is_dictionary(f.type) else f for f in wanted])
     table = pa.concat_tables([part.cast(plain) for part in parts])  # Arrow does not sort dictionaries
-    return table.sort_by([(name, "ascending") for name in _SORT[kind]]).combine_chunks().cast(wanted)
+    return table.sort_by([(name, "ascending") for name in _key(kind, varied)]).combine_chunks().cast(wanted)
+
+
+def _key(kind: str, varied: Sequence[str]) -> list[str]:
+    """Columns that name a row."""
+    return [*varied, *_SORT[kind]]
 
 
 def read_frame(run: Path | str, kind: str) -> pd.DataFrame:
     """One kind of table as a pandas frame; names are categories, units are in `frame.attrs["units"]`."""
-    frame = read_table(run, kind).to_pandas()
-    frame.attrs["units"] = schema.units(kind)
+    table = read_table(run, kind)
+    frame = table.to_pandas()
+    frame.attrs["units"] = {column.name: column.metadata[b"unit"].decode() for column in table.schema}
     return frame
 
 
@@ -98,14 +110,17 @@ def read_map(run: Path | str) -> pd.DataFrame:
 def to_xarray(run: Path | str, kind: str = schema.TRIALS) -> xr.Dataset:
     """A run as a labelled array: dimensions are the key of the table, variables have `units` and `long_name`.
 
-    Vehicle, gear set and learner become dimensions only if the run has more than one of them, else attributes. Cells
-    that are missing are NaN, which makes floats of whole numbers: seeds for a replay come from `read_trials`.
+    Vehicle, gear set, learner and varied paths become dimensions only if the run has more than one of them, else
+    attributes. Cells that are missing are NaN, which makes floats of whole numbers: seeds for a replay come from
+    `read_trials`.
     """
-    frame, columns = read_frame(run, kind), schema.schema(kind)
-    key = [name for name in _SORT[kind] if name in frame]
-    single = [name for name in ("vehicle", "gear_set", "learner") if name in key and frame[name].nunique() <= 1]
+    table = read_table(run, kind)
+    frame, columns, varied = table.to_pandas(), table.schema, schema.varied_columns(table.schema.names)
+    key = _key(kind, varied)
+    names = (*varied, "vehicle", "gear_set", "learner")
+    single = [name for name in names if name in key and frame[name].nunique() <= 1]
     attributes = {name: str(frame[name].iloc[0]) for name in single if len(frame)}
-    for name in CELL:
+    for name in (*CELL, *varied):
         if name in frame and isinstance(frame[name].dtype, pd.CategoricalDtype):
             frame[name] = frame[name].astype(object)
     indexed = frame.drop(columns=single).set_index([name for name in key if name not in single])
@@ -125,8 +140,9 @@ def _read_part(path: Path, wanted: pa.Schema) -> pa.Table:
     version = (table.schema.metadata or {}).get(VERSION_KEY, b"?").decode()
     if version != str(SCHEMA_VERSION):
         raise StoreError(f"{path}: schema version {version}, this program reads {SCHEMA_VERSION}")
-    if table.schema.names != wanted.names:
-        odd = sorted(set(table.schema.names) ^ set(wanted.names))
+    varied = schema.varied_columns(table.schema.names)
+    if table.schema.names != [*wanted.names, *varied]:
+        odd = sorted(set(table.schema.names) - set(varied) ^ set(wanted.names))
         raise StoreError(f"{path}: other columns than this version's: {', '.join(odd) or 'in another order'}")
     return table
 

@@ -2,9 +2,11 @@
 
 from typing import Any
 
+from ivl import yamlfile
 from ivl.sweep import plan, schema, store
-from ivl.sweep.config import PolicyMap, Sweep, values
+from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.engine import Result
+from ivl.sweep.vary import AXES, Value, as_cell, values
 
 STUCK_RATE, SOLVED_RATE = 0.5, 0.8
 """A trial is stuck below the first if another trial of its cell reached the second."""
@@ -14,21 +16,28 @@ def of_plan(grid: Sweep | PolicyMap, task_size: int) -> dict[str, Any]:
     """What would be flown."""
     tasks = plan.plan(grid, task_size)
     n_trials = sum(len(task.trials) for task in tasks)
-    report = {
+    report: dict[str, Any] = {
         "name": grid.name,
         "vehicle": grid.vehicle,
         "gear_set": grid.gear_set,
-        "gears": grid.gear_names(),
+        "gears": list(dict.fromkeys(task.gear for task in tasks)),
         "approaches": len(grid.approaches()),
         "trials": n_trials,
         "tasks": len(tasks),
         "task_size": task_size,
     }
+    if others := {path: found for path, found in grid.vary.items() if path not in AXES}:
+        report["vary"] = others
     if isinstance(grid, Sweep):
-        each = grid.budget + grid.check_rollouts
-        return {**report, "learner": grid.learner.name, "rollouts_at_most": n_trials * each}
+        at_most = sum(len(task.trials) * _rollouts_of(grid.at(task.varied)) for task in tasks)
+        return {**report, "learner": ", ".join(grid.learner_names()), "rollouts_at_most": at_most}
     points = len(values(grid.d_ceil_m)) * len(values(grid.moment_y_Nmm))
     return {**report, "points": n_trials * points, "rollouts": n_trials * points * grid.n_rollouts}
+
+
+def _rollouts_of(sweep: Sweep) -> int:
+    """Rollouts of one trial, at most."""
+    return sweep.budget + sweep.check_rollouts
 
 
 def of_run(result: Result) -> dict[str, Any]:
@@ -47,11 +56,27 @@ def of_run(result: Result) -> dict[str, Any]:
     if failed.num_rows:
         report["first_error"] = failed["error"][0].as_py()
     trials = store.read_frame(result.run, schema.TRIALS)
-    return {**report, **_learned(trials)} if len(trials) else report
+    if not len(trials):
+        return report
+    sweep = yamlfile.validate(Sweep, store.read_manifest(result.run)["sweep"], str(result.run))
+    groups = [{**names, "trials": len(part), **_learned(part)} for names, part in by_variant(sweep, trials)]
+    return {**report, **_learned(trials), **({"groups": groups} if groups else {})}
+
+
+def by_variant(sweep: Sweep, trials: Any) -> list[tuple[dict[str, Value], Any]]:
+    """The trials of each variant that has any, with its values by path; nothing if only `AXES` are varied."""
+    found = []
+    for varied in filter(None, sweep.variants()):
+        part = trials
+        for path, value in varied:
+            part = part[part[schema.column_of(path)] == as_cell(value)]
+        if len(part):
+            found.append((dict(varied), part))
+    return found
 
 
 def _learned(trials: Any) -> dict[str, Any]:
-    cells = trials.groupby([name for name in schema.CELL if name in trials], observed=True)
+    cells = trials.groupby(schema.cell_columns(trials), observed=True)
     rate = "landing_rate_four_leg_norm"
     best = cells[rate].transform("max")
     stuck = (trials[rate] < STUCK_RATE) & (best >= SOLVED_RATE)

@@ -20,6 +20,7 @@ from ivl.sweep import policymap, schema, tables, trials
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.plan import Task
 from ivl.sweep.trials import Trial
+from ivl.sweep.vary import as_cell
 from ivl.world import World
 
 Tables = dict[str, pa.Table]
@@ -62,13 +63,14 @@ def run_packed(grid: Sweep | PolicyMap, packed_world: bytes, task: Task, library
 def run_task(grid: Sweep | PolicyMap, world: World, task: Task) -> Done:
     """Fly a task on one thread; trials that raise are reported in `failures`, the others are not touched by it."""
     began, processor = time.monotonic(), time.process_time()
+    at = grid.at(task.varied)
     with threadpool_limits(1):  # the number of BLAS threads changes the last bits of a search
-        flown, failed = _fly_all_or_each(grid, world, task.trials)
+        flown, failed = _fly_all_or_each(at, world, task.trials)
         found = [one for one, _ in flown]
         merged = {kind: pa.concat_tables([one[kind] for one in found]) for kind in (found[0] if found else ())}
         if failed:
-            merged[schema.FAILURES] = tables.failures_table(grid, task.gear, task.number, failed)
-        parts = {kind: tables.encode(table) for kind, table in merged.items()}
+            merged[schema.FAILURES] = tables.failures_table(at, task.gear, task.number, failed)
+        parts = {kind: tables.encode(_with_varied(table, task)) for kind, table in merged.items()}
     return Done(
         parts=parts,
         n_trials=len(task.trials) - len(failed),
@@ -83,7 +85,8 @@ def run_task(grid: Sweep | PolicyMap, world: World, task: Task) -> Done:
 def lost(grid: Sweep | PolicyMap, task: Task, error: Exception) -> Done:
     """A task that no worker could finish: all its trials failed."""
     failed = [(trial, error) for trial in task.trials]
-    parts = {schema.FAILURES: tables.encode(tables.failures_table(grid, task.gear, task.number, failed))}
+    table = tables.failures_table(grid.at(task.varied), task.gear, task.number, failed)
+    parts = {schema.FAILURES: tables.encode(_with_varied(table, task))}
     return Done(parts, 0, len(failed), 0, 0.0, 0.0, "")
 
 
@@ -100,6 +103,16 @@ def record(task: Task, done: Done) -> bytes:
         "worker": [done.worker],
     }
     return tables.encode(tables.make_table(schema.TASKS, columns))
+
+
+def _with_varied(table: pa.Table, task: Task) -> pa.Table:
+    """The table with a column for each varied path that has none of its own."""
+    for path, value in task.varied:
+        if path not in schema.COLUMN_OF:
+            cell = as_cell(value)
+            field = schema.varied_field(path, isinstance(cell, float))
+            table = table.append_column(field, pa.array([cell] * table.num_rows).cast(field.type))
+    return table
 
 
 def _fly_all_or_each(

@@ -7,7 +7,7 @@ import typer
 
 from ivl import model
 from ivl.errors import ConfigError, IvlError
-from ivl.experiment import parse_setting
+from ivl.settings import parse_setting
 
 Folder = Annotated[Path, typer.Argument(metavar="FLIGHTS", help="Folder of flights; `ivl flight import` makes one.")]
 Vehicle = Annotated[str, typer.Option(help="Vehicle; see `ivl list vehicles`, or a YAML file.")]

@@ -10,8 +10,8 @@ from ivl import model
 from ivl.cli import console
 from ivl.cli.console import number, percent
 from ivl.errors import ConfigError, IvlError
-from ivl.experiment import parse_setting
 from ivl.links import pil
+from ivl.settings import parse_setting
 from ivl.world import World
 
 if TYPE_CHECKING:

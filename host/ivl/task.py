@@ -1,0 +1,122 @@
+"""What is flown: a vehicle with its gear and sensors, and the approach that it makes. Nothing else spells it.
+
+    task = Task(vehicle="habas2021", gear="wide_long", sensing="camera50", estimator="kalman",
+                speed_mps=3.0, angle_deg=60.0, start="flown")
+    world = task.make_world()
+
+An experiment is a task with a learner, a landing is a task with a policy, a sweep is a task with paths that it varies
+(`ivl.experiment`, `ivl.landing`, `ivl.sweep.config`). A new field of the task goes into this file; `--set` and
+`--vary` know it then, its option is a row of `ivl.cli.task_options`.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from ivl import model, native
+from ivl.sensing import APPROACHES, ESTIMATORS, approach_settings, estimator_settings
+from ivl.settings import Finite, Setting, Strict
+from ivl.world import World
+
+
+def _approach(name: str) -> str:
+    if name not in APPROACHES:
+        raise ValueError(f"unknown approach (allowed {', '.join(APPROACHES)})")
+    return name
+
+
+def _estimator(name: str) -> str:
+    if name not in ESTIMATORS:
+        raise ValueError(f"unknown estimator (allowed {', '.join(ESTIMATORS)})")
+    return name
+
+
+class Setup(Strict):
+    """The part of a task that is no place in a grid: all but landing gear and approach velocity."""
+
+    vehicle: str = Field(description="Vehicle; see `ivl list vehicles`.")
+    gear_set: str = Field(default=model.DEFAULT_GEAR_SET, description="Set of landing gears.")
+    sensing: str | None = Field(
+        default=None, description="Sensor set in place of the vehicle's own sensing; see `ivl list sensors`."
+    )
+    estimator: Annotated[str, AfterValidator(_estimator)] | None = Field(
+        default=None,
+        description=f"Source of the ceiling's distance, one of {', '.join(ESTIMATORS)}; "
+        "by default as vehicle or sensor set say.",
+    )
+    approach: Annotated[str, AfterValidator(_approach)] = Field(
+        default=APPROACHES[0], description=f"Shape of the approach, one of {', '.join(APPROACHES)}."
+    )
+    start: Literal["imparted", "flown", "at_trigger"] = Field(
+        default="imparted", description="At the approach velocity, from hover, or at the trigger."
+    )
+    overrides: dict[str, Setting] = Field(default_factory=dict, description="Parameters of the world that differ.")
+
+    def world_settings(self) -> dict[str, float]:
+        """World parameters that differ from what vehicle, gear and sensor set say."""
+        overrides = {name: setting.value for name, setting in self.overrides.items()}
+        return {**approach_settings(self.approach), **estimator_settings(self.estimator), **overrides}
+
+    def world_of(self, gear: str) -> World:
+        """The world of this set-up with one landing gear."""
+        return World(self.vehicle, gear, self.gear_set, self.sensing, **self.world_settings())
+
+    def setup(self) -> dict[str, Any]:
+        """The fields of the set-up by name, to make another object of them."""
+        return {name: getattr(self, name) for name in Setup.model_fields}
+
+
+class Task(Setup):
+    """A complete description of what is flown."""
+
+    gear: str = Field(description="Landing gear; see `ivl list gears`.")
+    speed_mps: Finite = Field(description="Approach speed, m/s.")
+    angle_deg: Finite = Field(description="Approach angle above the horizontal, degrees.")
+
+    @model_validator(mode="after")
+    def _in_range(self) -> Self:
+        for name in ("speed_mps", "angle_deg"):
+            check_range(name, getattr(self, name), f"{name}: value")
+        return self
+
+    def make_world(self) -> World:
+        """The world that the task is flown in."""
+        return self.world_of(self.gear)
+
+    def task(self) -> dict[str, Any]:
+        """The fields of the task by name, to make another object of them."""
+        return {name: getattr(self, name) for name in Task.model_fields}
+
+
+def check_range(name: str, value: float, what: str) -> None:
+    """Refuse a value that the simulator's table of specifications does not allow.
+
+    Args:
+        name: Field of the table.
+        value: The value.
+        what: What the error says before the value.
+
+    Raises:
+        ValueError: It is out of range.
+    """
+    entry = native.library().spec_fields[name]
+    if not entry.lo <= value <= entry.hi:
+        raise ValueError(f"{what} {value!r} is out of range (allowed {entry.lo:g} .. {entry.hi:g} {entry.unit})")
+
+
+def default_of(field: str) -> Any:
+    """Value of a field of the task where a command names none; None if it must be named."""
+    named = {"vehicle": model.DEFAULT_VEHICLE, "gear": model.DEFAULT_GEAR}
+    entry = Task.model_fields[field]
+    return named.get(field, None if entry.is_required() else entry.get_default())
+
+
+def settings_of(values: Mapping[str, float], source: str) -> dict[str, Setting]:
+    """Plain values of world parameters as overrides with their units.
+
+    Raises:
+        ConfigError: A name is unknown, or a value out of range.
+    """
+    checked = {name: model.check_override(name, value) for name, value in values.items()}
+    return {name: Setting(value=value, unit=model.unit(name), source=source) for name, value in checked.items()}
