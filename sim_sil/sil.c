@@ -292,7 +292,7 @@ uint32_t ivl_sil_form(int number, const char **name, const char **doc)
     return form->n_params;
 }
 
-int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field)
+int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field, const char **symbol)
 {
     const ivl_form_t *form = ivl_form((uint32_t)number);
     if (form == NULL || i >= form->n_params)
@@ -300,6 +300,7 @@ int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field)
         return -1;
     }
     const ivl_form_param_t *row = &form->params[i];
+    *symbol = row->symbol;
     *field = (ivl_sil_field_t){.name = row->name,
                                .type = "f4",
                                .offset = (uint32_t)(i * sizeof(float)),

@@ -76,7 +76,7 @@ uint32_t ivl_sil_form(int number, const char **name, const char **doc);
 
 /// A parameter of a form: offset in its array of floats, range in SI; `dflt` is what one `unit` is in SI.
 /// @return 0; -1 if there is none
-int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field);
+int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field, const char **symbol);
 
 /// 1 if a flight core with this model's configuration puts the policy in force, else 0.
 int ivl_sil_policy_accepted(const void *model, int form, const double *theta);

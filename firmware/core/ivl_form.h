@@ -17,7 +17,8 @@ typedef struct
 /// One parameter of a form.  Ranges and theta are in SI units; people see a value in `unit`, which is `per_unit` in SI.
 typedef struct
 {
-    const char *name;      ///< with its unit, for example "moment_y_Nmm"
+    const char *name;      ///< with its unit, for files and tables, for example "moment_y_Nmm"
+    const char *symbol;    ///< for people, for example "M_yd"
     const char *unit;      ///< that people use
     float       per_unit;  ///< 1 unit in SI
     float       lo, hi;    ///< allowed range, SI

@@ -25,7 +25,8 @@ class Parameter:
     """One parameter of a form.
 
     Attributes:
-        name: With its unit.
+        name: With its unit, for files and tables.
+        symbol: For people, with an index behind an underscore.
         unit: That people use.
         si: One unit in SI.
         lo: Smallest value that a vehicle accepts, in `unit`.
@@ -34,11 +35,19 @@ class Parameter:
     """
 
     name: str
+    symbol: str
     unit: str
     si: float
     lo: float
     hi: float
     doc: str
+
+    @property
+    def label(self) -> str:
+        """Symbol and unit as they stand at an axis."""
+        stem, _, index = self.symbol.partition("_")
+        stem = f"${stem}$" if len(stem) == 1 else stem
+        return f"{stem}$_{{{index}}}$ ({self.unit})" if index else f"{stem} ({self.unit})"
 
 
 @dataclass(frozen=True)
@@ -94,15 +103,15 @@ class Form:
     def describe(self, theta: npt.ArrayLike) -> str:
         """A theta as people read it."""
         values = np.asarray(theta, dtype=np.float64).tolist()
-        return ", ".join(f"{p.name} {value:.5g}" for p, value in zip(self.params, values, strict=True))
+        return ", ".join(f"{p.symbol} {value:.5g} {p.unit}" for p, value in zip(self.params, values, strict=True))
 
 
 @cache
 def forms() -> dict[str, Form]:
     """All forms that this library has, by name."""
     found = [
-        Form(number, name, doc, tuple(_parameter(field) for field in fields))
-        for number, (name, doc, fields) in enumerate(native.library().forms())
+        Form(number, name, doc, tuple(_parameter(*row) for row in rows))
+        for number, (name, doc, rows) in enumerate(native.library().forms())
     ]
     return {form.name: form for form in found}
 
@@ -118,9 +127,9 @@ def by_name(name: str) -> Form:
     return forms()[name]
 
 
-def _parameter(field: native.Field) -> Parameter:
+def _parameter(symbol: str, field: native.Field) -> Parameter:
     si = _decimal(field.default if field.default is not None else 1.0)
-    return Parameter(field.name, field.unit, si, _decimal(field.lo) / si, _decimal(field.hi) / si, field.doc)
+    return Parameter(field.name, symbol, field.unit, si, _decimal(field.lo) / si, _decimal(field.hi) / si, field.doc)
 
 
 def _decimal(value: float) -> float:

@@ -1,18 +1,19 @@
 """One landing by its specification: a world and the arguments of one rollout, from a YAML file, a run, or code.
 
-    spec = LandingSpec(gear="wide_long", speed_mps=3.0, angle_deg=60.0, rrev_c_per_s=4.0, moment_y_Nmm=7.0)
+    spec = LandingSpec(gear="wide_long", speed_mps=3.0, angle_deg=60.0, theta=[4.0, 7.0])
     world, trace = spec.fly()
 
 A landing is a task (`ivl.task`) with the policy and the random numbers of one rollout. Equal specifications give the
 same bits, today and in a report years later.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, model_validator
 
-from ivl import model, yamlfile
+from ivl import forms, model, yamlfile
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.seeds import Purpose, derive
@@ -29,8 +30,8 @@ class LandingSpec(Task):
 
     vehicle: str = model.DEFAULT_VEHICLE
     gear: str = model.DEFAULT_GEAR
-    rrev_c_per_s: Finite
-    moment_y_Nmm: Finite
+    form: str = Field(default=forms.PAPER, description="Form of the policy; see `ivl list forms`.")
+    theta: list[Finite] = Field(min_length=1, description="Parameters of the policy, in the form's order and units.")
     d_ceil_m: Finite | None = Field(default=None, description="Distance to the ceiling at the start, m.")
     seed: int = Field(default=0, ge=0, lt=2**64)
     stream: int = Field(default=0, ge=0, lt=2**64)
@@ -54,8 +55,8 @@ class LandingSpec(Task):
         trace = world.trace(
             self.speed_mps,
             self.angle_deg,
-            self.rrev_c_per_s,
-            self.moment_y_Nmm,
+            *self.theta,
+            form=self.form,
             seed=self.seed,
             start=self.start,
             d_ceil_m=self.d_ceil_m,
@@ -76,12 +77,12 @@ def load(path: Path) -> LandingSpec:
     return spec
 
 
-def of_rollout(experiment: Experiment, trial: int, theta: tuple[float, float], stream: int) -> LandingSpec:
+def of_rollout(experiment: Experiment, trial: int, theta: Sequence[float], stream: int) -> LandingSpec:
     """The specification of one rollout of a learning run: trial t flies with the seed of the run plus t."""
     return LandingSpec(
         **experiment.task(),
-        rrev_c_per_s=theta[0],
-        moment_y_Nmm=theta[1],
+        form=experiment.policy.form,
+        theta=list(theta),
         seed=derive(experiment.seed + trial, Purpose.WORLD),
         stream=stream,
     )

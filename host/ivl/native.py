@@ -143,16 +143,18 @@ class NativeLibrary:
         """Build a native model from the parameter vector (order of `params`)."""
         return NativeModel(self, values)
 
-    def forms(self) -> list[tuple[str, str, tuple[Field, ...]]]:
-        """Forms of policies by number: name, description, and parameters (range in SI; `default`: one unit in SI)."""
-        found: list[tuple[str, str, tuple[Field, ...]]] = []
+    def forms(self) -> list[tuple[str, str, tuple[tuple[str, Field], ...]]]:
+        """Forms of policies by number: name, description, parameters with symbol (range in SI; `default`: one unit in SI)."""
+        found: list[tuple[str, str, tuple[tuple[str, Field], ...]]] = []
         name, doc = ctypes.c_char_p(), ctypes.c_char_p()
         while n := self._c.ivl_sil_form(len(found), ctypes.byref(name), ctypes.byref(doc)):
-            rows = [_CField() for _ in range(n)]
-            for i, row in enumerate(rows):
-                self._c.ivl_sil_form_param(len(found), i, ctypes.byref(row))
-            found.append((_text(name), _text(doc), tuple(_field(row) for row in rows)))
+            found.append((_text(name), _text(doc), tuple(self._form_parameter(len(found), i) for i in range(n))))
         return found
+
+    def _form_parameter(self, number: int, i: int) -> tuple[str, Field]:
+        row, symbol = _CField(), ctypes.c_char_p()
+        self._c.ivl_sil_form_param(number, i, ctypes.byref(row), ctypes.byref(symbol))
+        return _text(symbol), _field(row)
 
     def policy_crc(self, form: int, theta_si: npt.NDArray[np.float64]) -> int:
         """Checksum of a policy: number of its form, and its parameters in SI units."""
@@ -331,7 +333,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_replay", c_int, (ptr, ptr, c_int, ptr, ptr, size, ptr)),
         ("ivl_sil_form", ctypes.c_uint32, (c_int, ctypes.POINTER(ctypes.c_char_p), ctypes.POINTER(ctypes.c_char_p))),
-        ("ivl_sil_form_param", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField))),
+        ("ivl_sil_form_param", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField), ctypes.POINTER(ctypes.c_char_p))),
         ("ivl_sil_policy_accepted", c_int, (ptr, c_int, ptr)),
         ("ivl_sil_policy_crc", ctypes.c_uint32, (c_int, ptr)),
         ("ivl_sil_hover", c_int, (ptr, ptr, size, ptr, size, double, ptr, size)),

@@ -2,7 +2,7 @@
 /// As many parameters as a form may have: a mean of thresholds, one moment.
 #include "ivl_form.h"
 
-#define THRESHOLD(i) {"threshold" #i "_per_s", "1/s", 1.0f, 0.0f, 20.0f, "one of the thresholds"}
+#define THRESHOLD(i) {"threshold" #i "_per_s", "R_" #i, "1/s", 1.0f, 0.0f, 20.0f, "one of the thresholds"}
 #define EIGHT(i)                                                                                                                           \
     THRESHOLD(i##0), THRESHOLD(i##1), THRESHOLD(i##2), THRESHOLD(i##3), THRESHOLD(i##4), THRESHOLD(i##5), THRESHOLD(i##6), THRESHOLD(i##7)
 
@@ -13,7 +13,7 @@ enum
 
 static const ivl_form_param_t PARAMS[] = {
     EIGHT(0),      EIGHT(1),      EIGHT(2),      EIGHT(3),      EIGHT(4),      EIGHT(5), EIGHT(6), THRESHOLD(70), THRESHOLD(71),
-    THRESHOLD(72), THRESHOLD(73), THRESHOLD(74), THRESHOLD(75), THRESHOLD(76), {"flip_Nmm", "N mm", 1.0e-3f, 0.0f, 0.02f, "moment"},
+    THRESHOLD(72), THRESHOLD(73), THRESHOLD(74), THRESHOLD(75), THRESHOLD(76), {"flip_Nmm", "M", "N mm", 1.0e-3f, 0.0f, 0.02f, "moment"},
 };
 _Static_assert(sizeof PARAMS / sizeof PARAMS[0] == IVL_FORM_PARAMS_MAX, "all of them");
 

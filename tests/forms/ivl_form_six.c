@@ -15,12 +15,12 @@ enum
 };
 
 static const ivl_form_param_t PARAMS[] = {
-    [RREV_0] = {"threshold_per_s", "1/s", 1.0f, 0.0f, 20.0f, "threshold of RREV at rest"},
-    [RREV_VZ] = {"threshold_vz_per_m", "1/m", 1.0f, -4.0f, 4.0f, "its change with the closing speed"},
-    [RREV_VX] = {"threshold_vx_per_m", "1/m", 1.0f, -4.0f, 4.0f, "its change with the speed along the ceiling"},
-    [MOMENT_0] = {"flip_Nmm", "N mm", 1.0e-3f, 0.0f, 0.02f, "moment at rest"},
-    [MOMENT_VZ] = {"flip_vz_mNs", "mN s", 1.0e-3f, -0.005f, 0.005f, "its change with the closing speed"},
-    [MOMENT_MOST] = {"flip_most_Nmm", "N mm", 1.0e-3f, 0.0f, 0.02f, "largest moment"},
+    [RREV_0] = {"threshold_per_s", "R_0", "1/s", 1.0f, 0.0f, 20.0f, "threshold of RREV at rest"},
+    [RREV_VZ] = {"threshold_vz_per_m", "R_z", "1/m", 1.0f, -4.0f, 4.0f, "its change with the closing speed"},
+    [RREV_VX] = {"threshold_vx_per_m", "R_x", "1/m", 1.0f, -4.0f, 4.0f, "its change with the speed along the ceiling"},
+    [MOMENT_0] = {"flip_Nmm", "M_0", "N mm", 1.0e-3f, 0.0f, 0.02f, "moment at rest"},
+    [MOMENT_VZ] = {"flip_vz_mNs", "M_z", "mN s", 1.0e-3f, -0.005f, 0.005f, "its change with the closing speed"},
+    [MOMENT_MOST] = {"flip_most_Nmm", "M_most", "N mm", 1.0e-3f, 0.0f, 0.02f, "largest moment"},
 };
 
 static ivl_action_t decide(const float theta[], const ivl_seen_t *seen)

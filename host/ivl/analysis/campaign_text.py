@@ -10,6 +10,7 @@ from ivl.analysis import region
 from ivl.analysis.claims import CLAIMS, PAPER_GEAR, Claim, evaluate, show
 from ivl.analysis.intervals import Estimate
 from ivl.analysis.moment import explained
+from ivl.analysis.policy import MOMENT, THRESHOLD, recommended
 from ivl.analysis.rates import CHECK_RATE, RATE, cell_rates, compare, mean_rate, single_trial_failures
 from ivl.analysis.separability import MODELS, separability
 
@@ -235,5 +236,5 @@ def _policy(trials: pd.DataFrame) -> str:
     solved = trials[trials[RATE] >= 0.8]
     if solved.empty:
         return "-"
-    rrev, moment = (solved[f"recommended_{c}"].median() for c in ("rrev_c_per_s", "moment_y_Nmm"))
+    rrev, moment = (solved[recommended(i)].median() for i in (THRESHOLD, MOMENT))
     return f"{rrev:.2f} 1/s, {moment:.1f} N mm"

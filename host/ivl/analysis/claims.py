@@ -15,6 +15,7 @@ from ivl.analysis import region
 from ivl.analysis.contact import contact_order
 from ivl.analysis.intervals import Estimate, difference
 from ivl.analysis.moment import explained
+from ivl.analysis.policy import MOMENT, THRESHOLD, recommended
 from ivl.analysis.rates import RATE, SOLVED_RATE, cell_rates, compare, mean_rate, profile
 from ivl.analysis.separability import auc_gain, separability
 
@@ -100,7 +101,7 @@ def _convergence(trials: pd.DataFrame) -> Found:
     cell = cell_rates(own).iloc[0]
     mean, low, high = (float(cell[f"rate_{end}_norm"]) for end in ("mean", "low", "high"))
     rate = Estimate(mean, low, high, int(cell["n_trials"]))
-    rrev, moment = (float(own[f"recommended_{name}"].median()) for name in ("rrev_c_per_s", "moment_y_Nmm"))
+    rrev, moment = (float(own[recommended(i)].median()) for i in (THRESHOLD, MOMENT))
     needed = float(own["rollouts_to_rate"].fillna(np.inf).median()) if "rollouts_to_rate" in own else float("nan")
     near = all(abs(a - b) <= c for a, b, c in zip((rrev, moment), PAPER_POLICY, POLICY_NEAR, strict=True))
     lands, soon = rate.value > 0.9, needed <= 104
@@ -111,7 +112,7 @@ def _convergence(trials: pd.DataFrame) -> Found:
         f"policy RREV_c {rrev:.2f} 1/s, M_yd {moment:.2f} N mm (medians)."
     )
     return verdict, finding, {
-        "rate_norm": rate, "rollouts_to_rate": needed, "rrev_c_per_s": rrev, "moment_y_Nmm": moment,
+        "rate_norm": rate, "rollouts_to_rate": needed, "threshold_per_s": rrev, "moment_Nmm": moment,
     }  # fmt: skip
 
 
@@ -183,15 +184,15 @@ def _nonlinear_moment(trials: pd.DataFrame) -> Found:
     """Yes: a forest explains half of M_yd (lower end) and more than a plane; partly: more than a plane."""
     points = region.trial_points(_gear(trials, PAPER_GEAR))
     points = points[points["success"]]
-    if points["condition"].nunique() < 2 or points["moment_y_Nmm"].nunique() < 2:
+    if points["condition"].nunique() < 2 or points["moment_Nmm"].nunique() < 2:
         return _unmeasured("two solved approaches of Wide-Short with different moments")
-    result = explained(points[list(region.AUGMENTED)], points["moment_y_Nmm"], points["condition"])
+    result = explained(points[list(region.AUGMENTED)], points["moment_Nmm"], points["condition"])
     more = result.gain.low > 0
     verdict = YES if more and result.nonlinear.low >= 0.5 else PARTLY if more else NO
     finding = (
         f"Wide-Short, {result.n_points} solved trials: R2 of M_yd from (RREV, OF_y, d) is {show(result.linear)} with a "
-        f"plane, {show(result.nonlinear)} with a forest; M_yd lies between {points['moment_y_Nmm'].quantile(0.05):.1f} "
-        f"and {points['moment_y_Nmm'].quantile(0.95):.1f} N mm (5 to 95 %)."
+        f"plane, {show(result.nonlinear)} with a forest; M_yd lies between {points['moment_Nmm'].quantile(0.05):.1f} "
+        f"and {points['moment_Nmm'].quantile(0.95):.1f} N mm (5 to 95 %)."
     )
     return verdict, finding, {"r2_plane": result.linear, "r2_forest": result.nonlinear, "r2_gain": result.gain}
 

@@ -13,6 +13,7 @@ import pandas as pd  # type: ignore[import-untyped]
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
+from ivl.analysis.policy import MOMENT, THRESHOLD, recommended
 from ivl.analysis.rates import rollouts_to_rate
 from ivl.errors import ConfigError
 from ivl.sweep.schema import TRIAL_KEY, varied_columns
@@ -22,8 +23,8 @@ COUNTS = ("trial", "n_recent", "n_triggered", "n_attached", "n_check", "rollouts
 STEPS = {
     "speed_mps": 0.01,
     "angle_deg": 0.01,
-    "recommended_rrev_c_per_s": 0.01,
-    "recommended_moment_y_Nmm": 0.05,
+    recommended(THRESHOLD): 0.01,
+    recommended(MOMENT): 0.05,
     "trigger_vx_mps": 0.01,
     "trigger_vz_mps": 0.01,
     "trigger_d_ceil_m": 0.002,
@@ -142,7 +143,7 @@ def unpack_states(table: pa.Table) -> pd.DataFrame:
         vz_mps=vz,
         rrev_per_s=vz / frame["d_ceil_m"],
         of_y_radps=-vx / frame["d_ceil_m"],
-        moment_y_Nmm=(frame["moment_low_Nmm"] + frame["moment_high_Nmm"]) / 2,
+        moment_Nmm=(frame["moment_low_Nmm"] + frame["moment_high_Nmm"]) / 2,
         success=frame["n_landing"] > 0,
         condition=frame.groupby(["speed_mps", "angle_deg"]).ngroup(),
     )

@@ -38,12 +38,12 @@ class Explained:
     n_points: int
 
 
-def explained(cues: npt.ArrayLike, moment_y_Nmm: npt.ArrayLike, condition: npt.ArrayLike, seed: int = 0) -> Explained:
+def explained(cues: npt.ArrayLike, moment_Nmm: npt.ArrayLike, condition: npt.ArrayLike, seed: int = 0) -> Explained:
     """Cross-validated R2 of M_yd from the cues.
 
     Args:
         cues: Shape (n, n_cues), finite.
-        moment_y_Nmm: Shape (n,), finite, N mm.
+        moment_Nmm: Shape (n,), finite, N mm.
         condition: Shape (n,); points of one condition are never split between training and test.
         seed: Of the forest and the bootstrap.
 
@@ -53,7 +53,7 @@ def explained(cues: npt.ArrayLike, moment_y_Nmm: npt.ArrayLike, condition: npt.A
     Raises:
         ValueError: Shapes do not fit or a value is not finite.
     """
-    x, y = np.asarray(cues, dtype=np.float64), np.asarray(moment_y_Nmm, dtype=np.float64)
+    x, y = np.asarray(cues, dtype=np.float64), np.asarray(moment_Nmm, dtype=np.float64)
     group = np.asarray(condition)
     if x.ndim != 2 or y.shape != (len(x),) or group.shape != y.shape:
         raise ValueError(f"explained: shapes {x.shape}, {y.shape}, {group.shape} do not fit")

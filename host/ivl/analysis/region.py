@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pandas as pd  # type: ignore[import-untyped]
 from scipy import ndimage  # type: ignore[import-untyped]
 
+from ivl.analysis.policy import MOMENT, recommended
 from ivl.analysis.rates import RATE, SOLVED_RATE
 from ivl.sweep.schema import TRIAL_KEY
 
@@ -46,17 +47,17 @@ def trial_points(trials: pd.DataFrame, rate: str = RATE, solved: float = SOLVED_
     """One point per trial that triggered: the mean state and cues in which its last three episodes flipped.
 
     Returns:
-        Columns of `CELL` and `trial` as given, `STATE`, `FLOW`, `moment_y_Nmm` (recommended), `rate_norm`, `success`
+        Columns of `CELL` and `trial` as given, `STATE`, `FLOW`, `moment_Nmm` (recommended), `rate_norm`, `success`
         (rate at least `solved`) and `condition` (number of the approach (V, phi)).
     """
     points = trials[(trials["n_triggered"] > 0) & trials[rate].notna()].rename(columns=_TRIGGER)
     points = points.assign(
-        moment_y_Nmm=points["recommended_moment_y_Nmm"],
+        moment_Nmm=points[recommended(MOMENT)],
         rate_norm=points[rate],
         success=points[rate] >= solved,
         condition=points.groupby(["speed_mps", "angle_deg"], observed=True).ngroup(),
     )
-    return points[[*TRIAL_KEY, *STATE, *FLOW, "moment_y_Nmm", "rate_norm", "success", "condition"]].reset_index(
+    return points[[*TRIAL_KEY, *STATE, *FLOW, "moment_Nmm", "rate_norm", "success", "condition"]].reset_index(
         drop=True
     )
 
@@ -71,20 +72,20 @@ def map_states(points: pd.DataFrame, solved: float = SOLVED_RATE) -> pd.DataFram
     Returns:
         One row per vehicle, gear and (V, phi, d), sorted: `STATE`, `FLOW`, `success` (some moment lands),
         `n_moments`, `n_landing`, `moment_low_Nmm`, `moment_high_Nmm` (ends of the longest run of neighbouring moments
-        that land, NaN without one), `moment_y_Nmm` (its middle), `condition` (number of the approach).
+        that land, NaN without one), `moment_Nmm` (its middle), `condition` (number of the approach).
     """
     keys = [*_SETUP, "speed_mps", "angle_deg", "d_ceil_m"]
-    ordered = points.sort_values([*keys, "moment_y_Nmm"], kind="stable")
+    ordered = points.sort_values([*keys, "moment_Nmm"], kind="stable")
     first = ordered.groupby(keys, observed=True, sort=True)
     states = first[["vx_mps", "vz_mps", *FLOW]].first().reset_index()
     rate = ordered["n_four_leg"] / ordered["n"].clip(lower=1)
     runs = [
-        _longest_run(part["moment_y_Nmm"].to_numpy(), part["rate"].to_numpy() >= solved)
+        _longest_run(part["moment_Nmm"].to_numpy(), part["rate"].to_numpy() >= solved)
         for _, part in ordered.assign(rate=rate).groupby(keys, observed=True, sort=True)
     ]
     columns = ["n_moments", "n_landing", "moment_low_Nmm", "moment_high_Nmm"]
     states[columns] = pd.DataFrame(runs, columns=columns, index=states.index)
-    states["moment_y_Nmm"] = (states["moment_low_Nmm"] + states["moment_high_Nmm"]) / 2
+    states["moment_Nmm"] = (states["moment_low_Nmm"] + states["moment_high_Nmm"]) / 2
     states["success"] = states["n_landing"] > 0
     states["condition"] = states.groupby(["speed_mps", "angle_deg"], observed=True).ngroup()
     return states
@@ -127,7 +128,7 @@ def grid_components(grid: npt.NDArray[np.bool_]) -> Components:
     return Components(int(n), float(largest), n_holes, n_points)
 
 
-def _longest_run(moment_y_Nmm: npt.NDArray[np.float64], lands: npt.NDArray[np.bool_]) -> tuple[int, int, float, float]:
+def _longest_run(moment_Nmm: npt.NDArray[np.float64], lands: npt.NDArray[np.bool_]) -> tuple[int, int, float, float]:
     """Number of moments, how many land, and the ends of the longest run of neighbours that do."""
     n, n_landing = len(lands), int(lands.sum())
     if not n_landing:
@@ -135,4 +136,4 @@ def _longest_run(moment_y_Nmm: npt.NDArray[np.float64], lands: npt.NDArray[np.bo
     edge = np.flatnonzero(np.diff(np.concatenate([[False], lands, [False]])))
     start, stop = edge[::2], edge[1::2]
     longest = int(np.argmax(stop - start))
-    return n, n_landing, float(moment_y_Nmm[start[longest]]), float(moment_y_Nmm[stop[longest] - 1])
+    return n, n_landing, float(moment_Nmm[start[longest]]), float(moment_Nmm[stop[longest] - 1])

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from ivl.experiment import POLICY
+from ivl.forms import Form
 from ivl.learn import Progress
 
 out = Console()
 err = Console(stderr=True)
 
-UNITS = {"rrev_c_per_s": ("RREV_c", "1/s"), "moment_y_Nmm": ("M_yd", "N mm")}
+_SHOWN_MAX = 4  # parameters in a line of progress
 
 
 def say(text: str) -> None:
@@ -25,13 +25,14 @@ def print_json(data: dict[str, Any]) -> None:
     print(json.dumps(data, allow_nan=False))
 
 
-def print_episode(progress: Progress) -> None:
-    """One line of live progress: episode, mu +- sigma of both parameters, landing rate, rollouts per second."""
+def print_episode(progress: Progress, form: Form) -> None:
+    """One line of live progress: episode, mu +- sigma of the first parameters, landing rate, rollouts per second."""
     mu = np.mean([row.mu for row in progress.rows], axis=0)
     sigma = np.mean([row.sigma for row in progress.rows], axis=0)
     policy = "  ".join(
-        f"{UNITS[name][0]} [bold]{mu[i]:5.2f}[/] ± {sigma[i]:4.2f} {UNITS[name][1]}" for i, name in enumerate(POLICY)
+        f"{p.symbol} [bold]{mu[i]:5.2f}[/] ± {sigma[i]:4.2f} {p.unit}" for i, p in enumerate(form.params[:_SHOWN_MAX])
     )
+    policy += f"  (and {form.n - _SHOWN_MAX} more)" if form.n > _SHOWN_MAX else ""
     rate = f"{100 * progress.rate_recent:3.0f} %" if np.isfinite(progress.rate_recent) else "  - "
     trials = f"  (mean of {len(progress.rows)} trials)" if len(progress.rows) > 1 else ""
     err.print(

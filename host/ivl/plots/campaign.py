@@ -29,7 +29,7 @@ LABELS = {
     "d_ceil_m": "$d$ (m)",
     "rrev_per_s": "RREV (1/s)",
     "of_y_radps": "$OF_y$ (rad/s)",
-    "moment_y_Nmm": "$M_{yd}$ (N mm)",
+    "moment_Nmm": "$M_{yd}$ (N mm)",
     "speed_mps": "$V$ (m/s)",
     "angle_deg": r"$\varphi$ (°)",
 }

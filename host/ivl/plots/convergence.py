@@ -1,4 +1,4 @@
-"""Convergence of a run in the manner of the paper's Fig. 4: mu +- 2 sigma of both parameters, and the landing rate."""
+"""Convergence of a run in the manner of the paper's Fig. 4: mu +- 2 sigma of each parameter, and the landing rate."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,13 +8,13 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from ivl.campaign import RunResult
-from ivl.experiment import POLICY, Experiment
+from ivl.experiment import Experiment
 from ivl.learn import RECENT_EPISODES
 from ivl.outcome import clean, four_leg
 from ivl.plots import style
 from ivl.store import SCORED, EpisodeRow, RolloutRows
 
-LABELS = {"rrev_c_per_s": "RREV$_c$ (1/s)", "moment_y_Nmm": "$M_{yd}$ (N mm)"}
+_SHOWN_MAX = 8  # parameters in the figure, the first of a longer form
 _FLOWN_COLOURS = (style.PURPLE, style.DIM)
 OUTCOMES = (
     ("four legs, clean", style.GREEN, "o"),
@@ -48,14 +48,16 @@ def draw(
         paths: Files to write.
         converged_at: Rollouts to convergence; drawn as a line unless None.
     """
-    figure = style.new_figure(6.5, 6.5)
-    axes = figure.subplots(3, 1, sharex=True, height_ratios=(3, 3, 2))
-    for i, name in enumerate(POLICY):
+    form = experiment.policy.shape
+    shown = form.params[:_SHOWN_MAX]
+    figure = style.new_figure(6.5, 2.5 + 2.0 * len(shown))
+    axes = figure.subplots(len(shown) + 1, 1, sharex=True, height_ratios=(*(3 for _ in shown), 2))
+    for i, parameter in enumerate(shown):
         _draw_parameter(axes[i], experiment, history, rollouts, i)
-        _draw_flown(axes[i], experiment, name)
-        axes[i].set_ylabel(LABELS[name])
-    _draw_rate(axes[2], experiment, history)
-    axes[2].set_xlabel("rollout")
+        _draw_flown(axes[i], experiment, i)
+        axes[i].set_ylabel(parameter.label)
+    _draw_rate(axes[-1], experiment, history)
+    axes[-1].set_xlabel("rollout")
     for axis in axes:
         axis.set_xlim(0, experiment.budget)
         style.finish(axis)
@@ -63,10 +65,11 @@ def draw(
             axis.axvline(converged_at, color=style.GREY, linewidth=1, linestyle=":")
     if converged_at is not None:
         text = f"solved after {converged_at} "
-        axes[2].text(converged_at, 0.96, text, ha="right", va="top", color=style.GREY, fontsize=style.SMALL)
+        axes[-1].text(converged_at, 0.96, text, ha="right", va="top", color=style.GREY, fontsize=style.SMALL)
     axes[0].set_title(
         f"{experiment.name}: {experiment.gear_set}/{experiment.gear}, {experiment.speed_mps:g} m/s at "
-        f"{experiment.angle_deg:g}°, {experiment.learner.name}, seed {experiment.seed}",
+        f"{experiment.angle_deg:g}°, {experiment.learner.name}, seed {experiment.seed}"
+        + (f"\nform {form.name}, the first {len(shown)} of {form.n} parameters" if form.n > len(shown) else ""),
         fontsize=style.NORMAL,
     )
     figure.legend(
@@ -79,7 +82,7 @@ def _draw_parameter(
     axis: Axes, experiment: Experiment, history: Sequence[EpisodeRow], rollouts: RolloutRows, i: int
 ) -> None:
     """One dot per rollout in the colour of its outcome, over the search distribution that it was drawn from."""
-    parameter = getattr(experiment.policy, POLICY[i])
+    parameter = experiment.policy.parameters[i]
     mu = np.array([parameter.mu0] + [row.mu[i] for row in history])
     sigma = np.array([parameter.sigma0] + [row.sigma[i] for row in history])
     at = experiment.n_rollouts * np.arange(len(mu))
@@ -95,10 +98,10 @@ def _draw_parameter(
     axis.set_ylim(*_limits(parameter.bounds, rollouts.theta[:, i]))
 
 
-def _draw_flown(axis: Axes, experiment: Experiment, name: str) -> None:
+def _draw_flown(axis: Axes, experiment: Experiment, i: int) -> None:
     """Where real flights landed: a band, or a line where they flew one policy."""
     for flown, colour in zip(experiment.flown, _FLOWN_COLOURS * len(experiment.flown), strict=False):
-        lo, hi = getattr(flown, name)
+        lo, hi = flown.of(experiment.policy.shape, "flown")[i]
         if hi > lo:
             axis.axhspan(lo, hi, color=colour, alpha=0.3, linewidth=0, label=flown.label)
         else:

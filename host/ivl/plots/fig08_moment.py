@@ -30,7 +30,7 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
     found = found[found["success"]]
     if found.empty:
         raise ConfigError("no trial of this part of the run reached a landing rate of 0.8: there is no region to draw")
-    moment = found["moment_y_Nmm"]
+    moment = found["moment_Nmm"]
     result = explained(found[list(AUGMENTED)], moment, found["condition"])
     title = "one moment alone"
     if np.isfinite(result.linear.value):
@@ -40,5 +40,5 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
         )
     limits = (float(np.floor(moment.min())), float(np.ceil(moment.max())))
     return draw_space(
-        data, found, Quantity("moment_y_Nmm", campaign.LABELS["moment_y_Nmm"], "viridis", limits), title, paths, dpi
+        data, found, Quantity("moment_Nmm", campaign.LABELS["moment_Nmm"], "viridis", limits), title, paths, dpi
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from ivl import campaign, landing, native
 from ivl.errors import StoreError
-from ivl.experiment import POLICY, Experiment
+from ivl.experiment import Experiment
 from ivl.outcome import four_leg
 from ivl.plots.convergence import outcome_classes
 from ivl.report import replay
@@ -118,11 +118,11 @@ def _verdict(path: Path, n_trials: int) -> list[list[str]]:
 def _episodes(experiment: Experiment, history: list[EpisodeRow], trial: int) -> dict[str, Any]:
     """The search of one trial, from its start on; rate and return begin with the first episode."""
     own = [row for row in history if row.trial == trial]
-    start = [getattr(experiment.policy, name) for name in POLICY]
+    start = experiment.policy.parameters
     return {
         "at": [experiment.n_rollouts * k for k in range(len(own) + 1)],
-        "mu": [encode([start[i].mu0, *(row.mu[i] for row in own)], 1e-3) for i in range(2)],
-        "sigma": [encode([start[i].sigma0, *(row.sigma[i] for row in own)], 1e-3) for i in range(2)],
+        "mu": [encode([p.mu0, *(row.mu[i] for row in own)], 1e-3) for i, p in enumerate(start)],
+        "sigma": [encode([p.sigma0, *(row.sigma[i] for row in own)], 1e-3) for i, p in enumerate(start)],
         "rate": encode([np.nan, *(row.rate_four_leg for row in own)], 1e-3),
         "reward": encode([np.nan, *(row.reward_mean for row in own)], 1e-2),
     }
@@ -136,17 +136,16 @@ def _rollouts(rollouts: RolloutRows, numbers: Any) -> dict[str, Any]:
     return {
         "at": list(range(1, len(rollouts) + 1)),
         "kind": kind.tolist(),
-        "theta": [encode(rollouts.theta[:, i], 1e-3) for i in range(2)],
+        "theta": [encode(column, 1e-3) for column in rollouts.theta.T],
         "reward": encode(rollouts.reward, 1e-2),
         "landing": numbers.tolist(),
     }
 
 
 def _limits(experiment: Experiment, rollouts: RolloutRows) -> list[list[float]]:
-    """Ranges of the four axes: parameters (bounds and what was flown), rate, return."""
+    """Ranges of the axes: parameters (bounds and what was flown), rate, return."""
     limits = []
-    for i, name in enumerate(POLICY):
-        bounds, flown = getattr(experiment.policy, name).bounds, rollouts.theta[:, i]
+    for bounds, flown in zip(experiment.policy.bounds, rollouts.theta.T, strict=True):
         lo, hi = min(bounds[0], flown.min()), max(bounds[1], flown.max())
         limits.append([float(lo - 0.03 * (hi - lo)), float(hi + 0.03 * (hi - lo))])
     return [*limits, [-0.03, 1.05], [0.0, 190.0]]

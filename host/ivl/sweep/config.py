@@ -19,9 +19,19 @@ from typing import Any, Literal, Self, TypeVar
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
-from ivl import experiment, model, native, yamlfile
-from ivl.errors import ConfigError, LearnerError
-from ivl.experiment import POLICY, Bounds, Experiment, LearnerChoice, Named, Policy, RewardChoice
+from ivl import experiment, forms, model, native, yamlfile
+from ivl.errors import ArgumentError, ConfigError, LearnerError
+from ivl.experiment import (
+    Bounds,
+    Experiment,
+    LearnerChoice,
+    Named,
+    PerParameter,
+    Policy,
+    PolicyParameter,
+    RewardChoice,
+    check_policy,
+)
 from ivl.seeds import Purpose, derive, derive_from_key
 from ivl.settings import (
     PACKAGE_DIR,
@@ -201,11 +211,10 @@ class _Grid(Setup, Named):
         return yamlfile.dump(self.model_dump(mode="json"))
 
 
-class StartRange(Strict):
+class StartRange(PerParameter):
     """Where the search of each trial starts: mu0 is drawn from these ranges, by the trial's own random numbers."""
 
-    rrev_c_per_s: Bounds
-    moment_y_Nmm: Bounds
+    __pydantic_extra__: dict[str, Bounds] = Field(init=False)
 
 
 class Sweep(_Grid):
@@ -228,12 +237,20 @@ class Sweep(_Grid):
     def _consistent(self) -> Self:
         if self.budget % self.n_rollouts:
             raise ValueError(f"budget {self.budget} is not a multiple of n_rollouts {self.n_rollouts}")
-        for name in POLICY if self.mu0_range else ():
-            lo, hi = getattr(self.mu0_range, name)
-            parameter = getattr(self.policy, name)
+        for name, parameter, (lo, hi) in self._starts():
             if not parameter.bounds[0] <= lo <= hi <= parameter.bounds[1]:
                 raise ValueError(f"mu0_range.{name}: {[lo, hi]} must lie in order inside the bounds {parameter.bounds}")
         return self
+
+    def _starts(self) -> list[tuple[str, PolicyParameter, list[float]]]:
+        """Name, parameter and range of its start; none if the start is not drawn."""
+        if self.mu0_range is None:
+            return []
+        try:
+            form = self.policy.shape
+            return list(zip(form.names, self.policy.parameters, self.mu0_range.of(form, "mu0_range"), strict=True))
+        except (ArgumentError, ConfigError) as error:
+            raise ValueError(str(error)) from error
 
     @property
     def n_episodes(self) -> int:
@@ -271,11 +288,10 @@ class Sweep(_Grid):
         if self.mu0_range is None:
             return self.policy
         rng = np.random.Generator(np.random.PCG64(derive(seed, Purpose.START)))
-        drawn = {}
-        for name in POLICY:
-            mu0 = float(rng.uniform(*getattr(self.mu0_range, name)))
-            drawn[name] = getattr(self.policy, name).model_copy(update={"mu0": mu0})
-        return Policy(**drawn)
+        drawn: dict[str, Any] = {}
+        for name, parameter, bounds in self._starts():
+            drawn[name] = parameter.model_copy(update={"mu0": float(rng.uniform(*bounds))})
+        return Policy(form=self.policy.form, **drawn)
 
 
 class PolicyMap(_Grid):
@@ -283,13 +299,15 @@ class PolicyMap(_Grid):
 
     start: Literal["at_trigger"] = "at_trigger"
     d_ceil_m: Axis
-    moment_y_Nmm: Axis
+    moment_Nmm: Axis
     n_rollouts: int = Field(default=8, ge=1, le=100_000, description="per point")
 
     @model_validator(mode="after")
     def _points_in_range(self) -> Self:
-        for name in ("d_ceil_m", "moment_y_Nmm"):
-            self._check_axis(name, name, values(getattr(self, name)))
+        self._check_axis("d_ceil_m", "d_ceil_m", values(self.d_ceil_m))
+        moment, given = forms.by_name(forms.PAPER).params[-1], values(self.moment_Nmm)
+        if not moment.lo <= min(given) <= max(given) <= moment.hi:
+            raise ValueError(f"moment_Nmm: is out of range ({moment.lo:g} .. {moment.hi:g} {moment.unit})")
         return self
 
     def cell_seed(self, gear: str, speed_mps: float, angle_deg: float) -> int:
@@ -319,7 +337,9 @@ def load_sweep(path: str, settings: Sequence[str] = (), vary: Sequence[str] = ()
         grid = sweep.at(varied)
         try:
             gear, (speed_mps, angle_deg) = grid.gear_names()[0], grid.approaches()[0]
-            grid.experiment(gear, speed_mps, angle_deg, trial=0).make_learner(seed=0)
+            trial = grid.experiment(gear, speed_mps, angle_deg, trial=0)
+            check_policy(trial, Path(path).name)
+            trial.make_learner(seed=0)
         except LearnerError as error:
             where = "".join(f"vary.{path}={text_of(value)}: " for path, value in varied)
             raise ConfigError(f"{Path(path).name}: {where}{error}") from error

@@ -20,15 +20,15 @@ def fly(grid: PolicyMap, world: World, cells: Sequence[Trial]) -> pa.Table:
 
 def _cell(grid: PolicyMap, world: World, cell: Trial) -> pa.Table:
     """All distances and moments at one approach; rollout k of point i has the stream i n + k within the cell's seed."""
-    points = np.stack(np.meshgrid(values(grid.d_ceil_m), values(grid.moment_y_Nmm), indexing="ij"), axis=-1)
-    d_ceil_m, moment_y_Nmm = points.reshape(-1, 2).T
+    points = np.stack(np.meshgrid(values(grid.d_ceil_m), values(grid.moment_Nmm), indexing="ij"), axis=-1)
+    d_ceil_m, moment_Nmm = points.reshape(-1, 2).T
     seed = grid.cell_seed(world.gear, cell.speed_mps, cell.angle_deg)
     stream = np.arange(d_ceil_m.size * grid.n_rollouts, dtype=np.uint64).reshape(d_ceil_m.size, grid.n_rollouts)
     outcomes = world.rollouts(
         cell.speed_mps,
         cell.angle_deg,
         0.0,  # the trigger is not waited for
-        moment_y_Nmm[:, None],
+        moment_Nmm[:, None],
         seed=seed,
         stream=stream,
         start="at_trigger",
@@ -46,7 +46,7 @@ def _cell(grid: PolicyMap, world: World, cell: Trial) -> pa.Table:
         "speed_mps": np.full(n, cell.speed_mps),
         "angle_deg": np.full(n, cell.angle_deg),
         "d_ceil_m": d_ceil_m,
-        "moment_y_Nmm": moment_y_Nmm,
+        "moment_Nmm": moment_Nmm,
         "vx_mps": np.full(n, vx_mps),
         "vz_mps": np.full(n, vz_mps),
         "rrev_per_s": vz_mps / d_ceil_m,

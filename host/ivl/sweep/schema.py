@@ -205,7 +205,7 @@ def _rollouts() -> Iterable[pa.Field]:
 def _map() -> Iterable[pa.Field]:
     yield from (f for f in _cell() if f.name != "learner")
     yield field("d_ceil_m", _F8, "m", "distance of the body origin from the plane of the cues, where the flip starts")
-    yield field("moment_y_Nmm", _F8, "N mm", "moment M_yd")
+    yield field("moment_Nmm", _F8, "N mm", "moment M_yd")
     yield field("vx_mps", _F8, "m/s", "velocity along x at the start of the flip, V cos phi")
     yield field("vz_mps", _F8, "m/s", "velocity towards the ceiling at the start of the flip, V sin phi")
     yield field("rrev_per_s", _F8, "1/s", "true RREV there, vz / d; what is sensed is older by up to a pose period")

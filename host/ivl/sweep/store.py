@@ -24,7 +24,7 @@ _SORT = {
     schema.TRIALS: TRIAL_KEY,
     schema.EPISODES: (*TRIAL_KEY, "episode"),
     schema.ROLLOUTS: (*TRIAL_KEY, "episode", "idx"),
-    schema.MAP: ("vehicle", "gear_set", "gear", "speed_mps", "angle_deg", "d_ceil_m", "moment_y_Nmm"),
+    schema.MAP: ("vehicle", "gear_set", "gear", "speed_mps", "angle_deg", "d_ceil_m", "moment_Nmm"),
     schema.FAILURES: TRIAL_KEY,
     schema.TASKS: ("task",),
 }

@@ -31,7 +31,7 @@ def of_plan(grid: Sweep | PolicyMap, task_size: int) -> dict[str, Any]:
     if isinstance(grid, Sweep):
         at_most = sum(len(task.trials) * _rollouts_of(grid.at(task.varied)) for task in tasks)
         return {**report, "learner": ", ".join(grid.learner_names()), "rollouts_at_most": at_most}
-    points = len(values(grid.d_ceil_m)) * len(values(grid.moment_y_Nmm))
+    points = len(values(grid.d_ceil_m)) * len(values(grid.moment_Nmm))
     return {**report, "points": n_trials * points, "rollouts": n_trials * points * grid.n_rollouts}
 
 
