@@ -17,6 +17,7 @@ from pathlib import Path
 from ivl import campaign, experiment, native
 from ivl.errors import IvlError
 from ivl.experiment import Experiment
+from ivl.layout import layout_of
 from ivl.learn import LearningRun
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.fields import SilField
@@ -109,7 +110,9 @@ def rows_of(folder: Path) -> list[Rows]:
 def learn(chosen: Experiment, folder: Path, source: CrazyflieSource | WorldSource) -> None:
     """Learn, without judging what was learned."""
     manifest = campaign.make_manifest(chosen, chosen.make_world())
-    with RunStore.create(folder, chosen.to_yaml(), manifest, native.library().outcome_dtype) as store:
+    with RunStore.create(
+        folder, chosen.to_yaml(), manifest, native.library().outcome_dtype, layout_of(chosen)
+    ) as store:
         LearningRun(chosen, source, store).run()
 
 

@@ -21,6 +21,7 @@ import ivl
 from ivl import assess, experiment, links, native, yamlfile
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
+from ivl.layout import layout_of
 from ivl.learn import LearningRun, Progress, recent_rate
 from ivl.links.options import Options
 from ivl.outcome import four_leg
@@ -196,15 +197,22 @@ def make_manifest(
 
 def _open(folder: Path, chosen: Experiment, manifest: dict[str, Any], resume: bool) -> RunStore:
     dtype = native.library().outcome_dtype
+    layout = layout_of(chosen)
     if not resume or not (folder / "manifest.json").exists():
         if resume and not folder.exists():
             raise StoreError(f"{folder}: there is no run to resume")
-        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype)
+        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype, layout)
     old = read_manifest(folder)
     for key in _MUST_MATCH:
         if old.get(key) != manifest[key]:
             raise StoreError(f"{folder}: cannot be resumed: {_difference(folder, key, old, manifest, chosen)}")
-    return RunStore.open_existing(folder, dtype)
+    store = RunStore.open_existing(folder, dtype)
+    if store.layout != layout:
+        store.close()
+        raise StoreError(
+            f"{folder}: cannot be resumed: the terms of its reward or the parameters of its policy changed"
+        )
+    return store
 
 
 def _difference(folder: Path, key: str, old: dict[str, Any], new: dict[str, Any], chosen: Experiment) -> str:

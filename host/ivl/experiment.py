@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from ivl import model, native, sensing, yamlfile
 from ivl.errors import ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
-from ivl.reward import REWARDS, RewardOptions
+from ivl.rewards import RewardChoice
 from ivl.world import World
 
 PACKAGE_DIR = Path(__file__).parent
@@ -60,19 +60,6 @@ class LearnerChoice(Strict):
 
     name: str
     options: dict[str, Any] = Field(default_factory=dict)
-
-
-class RewardChoice(Strict):
-    """A reward by name, with its constants."""
-
-    name: str = "paper"
-    options: RewardOptions = RewardOptions()
-
-    @model_validator(mode="after")
-    def _known(self) -> Self:
-        if self.name not in REWARDS:
-            raise ValueError(f"no reward {self.name!r} (allowed {', '.join(REWARDS)})")
-        return self
 
 
 class GridAxis(Strict):
@@ -252,6 +239,8 @@ def apply_setting(data: dict[str, Any], setting: str) -> None:
         target = target.setdefault(key, {})
         if not isinstance(target, dict):
             raise ConfigError(f"--set {setting}: {key} is a value, it has no field {last!r}")
+    if parents and last == "name" and target.get(last) != value:
+        target.pop("options", None)  # they belong to the reward or learner of the old name
     target[last] = value
 
 

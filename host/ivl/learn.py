@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ivl import reward as rewards
 from ivl.experiment import Experiment
 from ivl.learners import Learner
 from ivl.outcome import Outcomes, clean, four_leg
@@ -100,14 +99,13 @@ class LearningRun:
 
     def _fly(self, rollouts: RolloutRows) -> None:
         """Fly what is still planned and commit each portion as it comes."""
-        reward = rewards.by_name(self.experiment.reward.name)
         open_rows = np.flatnonzero(rollouts.status == PLANNED)
         trial = rollouts.trial[open_rows]
         plan = Plan(rollouts.theta[open_rows], self._world_seed[trial], rollouts.stream[open_rows])
         for flown in self._source.fly(plan):
             rows = open_rows[flown.index]
             keys = [(int(rollouts.trial[i]), int(rollouts.episode[i]), int(rollouts.idx[i])) for i in rows]
-            terms = reward(flown.outcomes, self.experiment.reward.options)
+            terms = self.experiment.reward.score(flown.outcomes)
             self._store.score(keys, flown.outcomes, terms, flown.discarded)
             self._n_flown += len(keys)
 

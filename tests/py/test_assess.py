@@ -5,6 +5,7 @@ import ivl
 from ivl import assess, native
 from ivl.assess import Best, Verdict
 from ivl.experiment import Experiment, GridAxis
+from ivl.layout import layout_of
 from ivl.learn import LearningRun
 from ivl.source import WorldSource
 from ivl.store import SCHEMA_VERSION, EpisodeRow, RolloutRows, RunStore
@@ -136,7 +137,8 @@ def test_summary_begins_with_the_keys_that_scripts_rely_on() -> None:
 
 def test_a_real_run_is_judged_from_its_store(small: Experiment, world: ivl.World, tmp_path: object) -> None:
     dtype = native.library().outcome_dtype
-    with RunStore.create(tmp_path / "run", "", {"schema_version": SCHEMA_VERSION}, dtype) as store:  # type: ignore[operator]
+    manifest = {"schema_version": SCHEMA_VERSION}
+    with RunStore.create(tmp_path / "run", "", manifest, dtype, layout_of(small)) as store:  # type: ignore[operator]
         LearningRun(small, WorldSource(world, small), store, 2).run()
         verdicts = assess.judge(world, small, BEST, store.episodes(), store.rollouts())
         failed = (store.rollouts(trial=1).outcomes["n_legs"] < 3).sum()

@@ -7,19 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ivl import native
+from ivl import experiment, native
 from ivl.errors import RolloutError
 from ivl.experiment import Experiment
+from ivl.layout import layout_of
 from ivl.learn import LearningRun, Progress, recent_rate
 from ivl.source import Flown, Plan, WorldSource
 from ivl.store import SCHEMA_VERSION, EpisodeRow, RunStore
 
 DTYPE = native.library().outcome_dtype
+LAYOUT = layout_of(experiment.load("experiments/paper_vertical.yaml"))
 N_TRIALS = 3
 
 
 def create(folder: Path) -> RunStore:
-    return RunStore.create(folder, "", {"schema_version": SCHEMA_VERSION}, DTYPE)
+    return RunStore.create(folder, "", {"schema_version": SCHEMA_VERSION}, DTYPE, LAYOUT)
 
 
 def reopen(folder: Path) -> RunStore:

@@ -10,11 +10,12 @@ from small_sweep import fly, make, same_tables
 
 import ivl
 from ivl import native
+from ivl.layout import layout_of
 from ivl.learn import LearningRun
 from ivl.learners import LEARNERS, Entry, RobustEPHE
 from ivl.outcome import clean, four_leg
 from ivl.source import WorldSource
-from ivl.store import RunStore
+from ivl.store import SCHEMA_VERSION, RunStore
 from ivl.sweep import store, trials, work
 from ivl.sweep.config import Sweep
 from ivl.sweep.plan import Task
@@ -41,9 +42,8 @@ def test_a_trial_is_what_ivl_learn_does_with_its_seed(learner: str, tmp_path: Pa
     log = trials.run(sweep, world, [Trial(2.5, 60.0, 0), Trial(3.5, 90.0, 1)])
     chosen = sweep.experiment("wide_long", 3.5, 90.0, 1)
     assert chosen.seed == log.run_seed[1]
-    with RunStore.create(
-        tmp_path / "run", chosen.to_yaml(), {"schema_version": 1}, native.library().outcome_dtype
-    ) as run:
+    dtype, manifest = native.library().outcome_dtype, {"schema_version": SCHEMA_VERSION}
+    with RunStore.create(tmp_path / "run", chosen.to_yaml(), manifest, dtype, layout_of(chosen)) as run:
         LearningRun(chosen, WorldSource(world, chosen, 1), run).run()
         rollouts, episodes = run.rollouts(), run.episodes()
     assert (log.theta[1].reshape(-1, 2) == rollouts.theta).all()

@@ -11,7 +11,7 @@ from ivl.cli import console
 from ivl.errors import LinkError
 from ivl.links.options import Options
 from ivl.mocap import config as mocap_config
-from ivl.reward import RewardOptions, paper
+from ivl.rewards import TOTAL, RewardChoice
 
 HELP = """Fly one landing with a vehicle, and print what it latched at the trigger and how it ended.
 
@@ -90,5 +90,5 @@ def _outcome(record: Any, end_reason: str) -> dict[str, Any]:
     result = outcome.as_dict(record[0], end_reason)
     result["four_leg"] = bool(outcome.four_leg(record)[0])
     result["clean"] = bool(outcome.clean(record)[0])
-    result["reward_paper"] = float(paper(record, RewardOptions()).total[0])
+    result["reward_paper"] = float(RewardChoice(name="paper").score(record)[TOTAL][0])
     return result

@@ -11,7 +11,7 @@ from ivl import model, outcome, tracefile
 from ivl.cli import console
 from ivl.errors import ConfigError
 from ivl.experiment import parse_setting
-from ivl.reward import RewardOptions, paper
+from ivl.rewards import TOTAL, RewardChoice
 from ivl.world import Trace, World
 
 HELP = """Fly one landing and print its outcome.
@@ -96,7 +96,7 @@ def _result(world: World, flight: Trace) -> dict[str, Any]:
     batch = np.array([record], dtype=record.dtype)
     result["four_leg"] = bool(outcome.four_leg(batch)[0])
     result["clean"] = bool(outcome.clean(batch)[0])
-    result["reward_paper"] = float(paper(batch, RewardOptions()).total[0])
+    result["reward_paper"] = float(RewardChoice(name="paper").score(batch)[TOTAL][0])
     return result
 
 

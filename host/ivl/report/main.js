@@ -65,12 +65,17 @@ function showLearn(data, replay) {
   $("#convergence-plot").on("plotly_click", ({ points: [point] }) => { if (point.customdata !== undefined) replay.show(0, rollouts.landing[point.customdata]); });
   if (series.length > 1) fillChoice($("#trial"), learn.episodes.map((_, i) => `trial ${i}`), draw);
   $("#notable").hidden = false;
-  table($("#notable-table"), ["landing", "return", "feet", "RREV_c, 1/s", "M_yd, N mm", "replay"], learn.notable.map(({ what, landing }) => {
+  table($("#notable-table"), ["landing", "return", ...data.terms.map(([name]) => name), "feet", "RREV_c, 1/s", "M_yd, N mm", "replay"], learn.notable.map(({ what, landing }) => {
     const { outcome, spec } = data.landings[landing];
-    return [what, outcome.reward.toFixed(1), `${outcome.n_legs}${outcome.body_contact ? ", body" : ""}`, spec.rrev_c_per_s.toFixed(2), spec.moment_y_Nmm.toFixed(2), replayButtons(replay, landing, what)];
+    return [what, figures(outcome.reward), ...data.terms.map(([name]) => figures(outcome.terms[name])), `${outcome.n_legs}${outcome.body_contact ? ", body" : ""}`, spec.rrev_c_per_s.toFixed(2), spec.moment_y_Nmm.toFixed(2), replayButtons(replay, landing, what)];
   }));
   $("#convergence-note").textContent = "Rate: share of landings on three or four legs in an episode. Click a dot to replay that rollout in view A.";
   [1, 0].forEach((pane) => replay.show(pane, learn.notable[learn.first_shown[pane]].landing));
+}
+
+// A term of the return as text; its scale is the reward's own.
+function figures(value) {
+  return String(Number(value.toPrecision(4)));
 }
 
 function seriesOf(stored) {

@@ -100,6 +100,6 @@ function outcomeDots(rollouts) {
   return OUTCOMES.flatMap(([name, color, symbol], kind) => [0, 1].map((i) => {
     const own = rollouts.kind.map((k, n) => (k === kind ? n : -1)).filter((n) => n >= 0);
     return { x: own.map((n) => rollouts.at[n]), y: own.map((n) => rollouts.theta[i][n]), customdata: own, yaxis: PANELS[i][1], mode: "markers", name, legendgroup: name, showlegend: i === 0,
-      text: own.map((n) => `rollout ${n}: ${name}, return ${rollouts.reward[n].toFixed(1)}`), hovertemplate: "%{text}<extra>click to replay</extra>", marker: { color, symbol, size: 7 } };
+      text: own.map((n) => `rollout ${n}: ${name}, return ${figures(rollouts.reward[n])}`), hovertemplate: "%{text}<extra>click to replay</extra>", marker: { color, symbol, size: 7 } };
   }));
 }

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
-from ivl import reward
 from ivl.analysis.claims import evaluate
 from ivl.analysis.rates import CLEAN_RATE, RATE, SOLVED_RATE, cell_rates, rollouts_to_rate
 from ivl.errors import StoreError
 from ivl.landing import LandingSpec
 from ivl.report import replay
 from ivl.report.landings import Album, thinned
-from ivl.report.page import encode, flatten, learner_words
+from ivl.report.page import axis_from_zero, encode, fine_unit, flatten, learner_words, reward_names
+from ivl.rewards import TOTAL
 from ivl.sweep import store
 from ivl.sweep.config import Sweep, load_sweep
 from ivl.sweep.schema import CELL, TRIAL_KEY
@@ -33,7 +33,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
     """
     manifest, sweep = store.read_manifest(folder), load_sweep(str(folder / "sweep.yaml"))
     trials, cells = _tables(folder)
-    album = Album()
+    album = Album(sweep.reward)
     trials["landing"] = _fly(sweep, trials, album, n_landings_max, on_landing)
     data = {
         "title": f"Inverted landing: {sweep.name}",
@@ -44,6 +44,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
         "scale": replay.SCALE,
         "geometry": album.geometry,
         "landings": album.landings,
+        "terms": reward_names(sweep.reward),
         "sweep": _encode(sweep, trials, cells, _places(cells), _episodes(folder, sweep, trials)),
     }
     return data, album
@@ -105,8 +106,8 @@ def _is_recorded(sweep: Sweep, trial: pd.Series) -> Callable[[Any], bool]:
     """Whether an outcome has the return, feet and body contact that the table of trials tells, exactly."""
 
     def same(record: Any) -> bool:
-        terms = reward.by_name(sweep.reward.name)(np.array([record], dtype=record.dtype), sweep.reward.options)
-        found = (float(terms.total[0]), int(record["n_legs"]), int(record["body_contact"]))
+        terms = sweep.reward.score(np.array([record], dtype=record.dtype))
+        found = (float(terms[TOTAL][0]), int(record["n_legs"]), int(record["body_contact"]))
         return found == (trial["best_reward"], trial["best_n_legs"], trial["best_body_contact"])
 
     return same
@@ -172,7 +173,7 @@ def _episodes(folder: Path, sweep: Sweep, trials: pd.DataFrame) -> dict[str, Any
         "mu": [encode(both[f"mu_{name}"], 1e-2) for name in _PARAMETERS.values()],
         "sigma": [encode(both[f"sigma_{name}"], 1e-2) for name in _PARAMETERS.values()],
         "rate": encode(both["rate"], 1e-2),
-        "reward": encode(both["reward"], 1.0),
+        "reward": encode(both["reward"], fine_unit(both["reward"], 3)),
     }
 
 
@@ -193,7 +194,11 @@ def _encode(
         },
         "trials": _encode_trials(trials),
         "episodes": episodes,
-        "limits": [*(_limits(sweep, trials, name) for name in _PARAMETERS.values()), [-0.03, 1.05], [0.0, 190.0]],
+        "limits": [
+            *(_limits(sweep, trials, name) for name in _PARAMETERS.values()),
+            [-0.03, 1.05],
+            axis_from_zero(trials["best_reward"]),
+        ],
     }
 
 

@@ -15,7 +15,8 @@ from pydantic import Field, model_validator
 
 from ivl import experiment, model, native, yamlfile
 from ivl.errors import ConfigError, LearnerError
-from ivl.experiment import POLICY, Bounds, Experiment, Finite, LearnerChoice, Policy, RewardChoice, Setting, Strict
+from ivl.experiment import POLICY, Bounds, Experiment, Finite, LearnerChoice, Policy, Setting, Strict
+from ivl.rewards import RewardChoice
 from ivl.seeds import Purpose, derive, derive_from_key
 from ivl.world import World
 

@@ -16,6 +16,7 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import xarray as xr
 
 from ivl.errors import StoreError
+from ivl.layout import Layout
 from ivl.store import write_durably
 from ivl.sweep import schema
 from ivl.sweep.schema import CELL, KINDS, SCHEMA_VERSION, TASKS, TRIAL_KEY, VERSION_KEY
@@ -51,15 +52,21 @@ def read_manifest(run: Path | str) -> dict[str, Any]:
     return manifest
 
 
+def read_layout(run: Path | str) -> Layout:
+    """What the columns of a run's policies and returns are (errors as `read_manifest`)."""
+    return Layout.from_dict(read_manifest(run)["layout"])
+
+
 def read_table(run: Path | str, kind: str) -> pa.Table:
     """One kind of table of a run (see `schema.KINDS`), its key in ascending order; no rows if nothing was kept.
 
     Raises:
-        StoreError: A file cannot be read or has other columns than this version writes.
+        StoreError: The folder holds no sweep of this version, or a file cannot be read or has other columns than this
+            version writes.
     """
     if kind not in KINDS:
         raise StoreError(f"{run}: no table {kind!r} (allowed {', '.join(KINDS)})")
-    wanted = schema.schema(kind)
+    wanted = schema.schema(kind, read_layout(run))
     parts = [_read_part(path, wanted) for path in sorted((Path(run) / kind).glob("*.parquet"))]
     if not parts:
         return wanted.empty_table()
@@ -71,12 +78,12 @@ def read_table(run: Path | str, kind: str) -> pa.Table:
 def read_frame(run: Path | str, kind: str) -> pd.DataFrame:
     """One kind of table as a pandas frame; names are categories, units are in `frame.attrs["units"]`."""
     frame = read_table(run, kind).to_pandas()
-    frame.attrs["units"] = schema.units(kind)
+    frame.attrs["units"] = schema.units(kind, read_layout(run))
     return frame
 
 
 def read_trials(run: Path | str) -> pd.DataFrame:
-    """One row per trial; columns as `schema.schema("trials")`."""
+    """One row per trial; columns as `schema.schema("trials", layout)`."""
     return read_frame(run, schema.TRIALS)
 
 
@@ -101,7 +108,7 @@ def to_xarray(run: Path | str, kind: str = schema.TRIALS) -> xr.Dataset:
     Vehicle, gear set and learner become dimensions only if the run has more than one of them, else attributes. Cells
     that are missing are NaN, which makes floats of whole numbers: seeds for a replay come from `read_trials`.
     """
-    frame, columns = read_frame(run, kind), schema.schema(kind)
+    frame, columns = read_frame(run, kind), schema.schema(kind, read_layout(run))
     key = [name for name in _SORT[kind] if name in frame]
     single = [name for name in ("vehicle", "gear_set", "learner") if name in key and frame[name].nunique() <= 1]
     attributes = {name: str(frame[name].iloc[0]) for name in single if len(frame)}

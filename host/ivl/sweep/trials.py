@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl import native
-from ivl import reward as rewards
 from ivl.experiment import Experiment
 from ivl.learn import RECENT_EPISODES
 from ivl.learners import Learner
 from ivl.outcome import Outcomes, clean, four_leg, valid
+from ivl.rewards import TOTAL
 from ivl.seeds import Purpose, derive
 from ivl.sweep.config import Sweep
 from ivl.world import World
@@ -46,6 +46,7 @@ class Log:
         stopped: Whether the learner ended the trial, shape (t,).
         theta: Policies, shape (t, e, n, 2).
         reward: Returns, shape (t, e, n), NaN where not scored.
+        terms: Terms of the returns by name, shape (t, e, n) each, NaN where not scored.
         scored: Whether a rollout was learned from, shape (t, e, n).
         outcomes: Outcome records, shape (t, e, n).
         mu: Centre of the search after each episode, shape (t, e, 2).
@@ -63,6 +64,7 @@ class Log:
     stopped: npt.NDArray[np.bool_]
     theta: FloatArray
     reward: FloatArray
+    terms: dict[str, FloatArray]
     scored: npt.NDArray[np.bool_]
     outcomes: Outcomes
     mu: FloatArray
@@ -118,6 +120,7 @@ def _empty_log(sweep: Sweep, trials: Sequence[Trial], experiments: Sequence[Expe
         stopped=np.zeros(t, dtype=np.bool_),
         theta=np.full((t, e, n, 2), np.nan),
         reward=np.full((t, e, n), np.nan),
+        terms={term.name: np.full((t, e, n), np.nan) for term in sweep.reward.reward.terms},
         scored=np.zeros((t, e, n), dtype=np.bool_),
         outcomes=outcomes,
         mu=np.full((t, e, 2), np.nan),
@@ -134,10 +137,12 @@ def _fly(
     theta = np.stack([learners[i].ask() for i in active])
     first = episode * sweep.n_rollouts
     outcomes = _batch(sweep, world, log, active, theta, log.world_seed, first + np.arange(sweep.n_rollouts))
-    terms = rewards.by_name(sweep.reward.name)(outcomes, sweep.reward.options)
+    terms = sweep.reward.score(outcomes)
     scored = valid(outcomes)
     log.theta[active, episode], log.outcomes[active, episode], log.scored[active, episode] = theta, outcomes, scored
-    log.reward[active, episode] = np.where(scored, terms.total, np.nan)
+    log.reward[active, episode] = np.where(scored, terms[TOTAL], np.nan)
+    for name, own in log.terms.items():
+        own[active, episode] = np.where(scored, terms[name], np.nan)
 
 
 def _tell(log: Log, learners: Sequence[Learner], active: npt.NDArray[np.intp], episode: int) -> None:
