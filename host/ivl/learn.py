@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ivl.experiment import Experiment
 from ivl.learners import Learner
+from ivl.learners.base import LANDED
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.seeds import Purpose, derive
 from ivl.source import Plan, RolloutSource
@@ -114,7 +115,7 @@ class LearningRun:
         for trial in active:
             chosen = (rollouts.trial == trial) & (rollouts.status == SCORED)
             outcomes, learner = rollouts.outcomes[chosen], self._learners[trial]
-            meta = {name: outcomes[name] for name in outcomes.dtype.names or ()}
+            meta = {name: outcomes[name] for name in outcomes.dtype.names or ()} | {LANDED: four_leg(outcomes)}
             learner.tell(rollouts.theta[chosen], rollouts.reward[chosen], meta)
             rows.append(_episode_row(trial, episode, learner, rollouts.reward[chosen], outcomes))
             states.append(learner.state_dict())

@@ -14,6 +14,7 @@ from ivl import native
 from ivl.experiment import Experiment
 from ivl.learn import RECENT_EPISODES
 from ivl.learners import Learner
+from ivl.learners.base import LANDED
 from ivl.outcome import Outcomes, clean, four_leg, valid
 from ivl.rewards import TOTAL
 from ivl.seeds import Purpose, derive
@@ -149,6 +150,7 @@ def _tell(log: Log, learners: Sequence[Learner], active: npt.NDArray[np.intp], e
     for i in active:
         scored, outcomes = log.scored[i, episode], log.outcomes[i, episode]
         meta = {name: outcomes[name][scored] for name in outcomes.dtype.names or ()}
+        meta[LANDED] = four_leg(outcomes)[scored]
         learners[i].tell(log.theta[i, episode][scored], log.reward[i, episode][scored], meta)
         result = learners[i].result
         log.mu[i, episode], log.sigma[i, episode] = result.mu, result.sigma
