@@ -18,13 +18,14 @@ from ivl import campaign, experiment, native
 from ivl.errors import IvlError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
-from ivl.learn import LearningRun
+from ivl.learning.loop import LearningRun
+from ivl.learning.recorder import SCORED
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.fields import SilField
 from ivl.links.options import Options
 from ivl.silproc import SilProcess
 from ivl.source import WorldSource
-from ivl.store import SCORED, RunStore
+from ivl.store import RunStore
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "RELIABILITY.md"
@@ -113,7 +114,7 @@ def learn(chosen: Experiment, folder: Path, source: CrazyflieSource | WorldSourc
     with RunStore.create(
         folder, chosen.to_yaml(), manifest, native.library().outcome_dtype, layout_of(chosen)
     ) as store:
-        LearningRun(chosen, source, store).run()
+        LearningRun([chosen], source, store).run()
 
 
 @contextmanager

@@ -24,7 +24,7 @@ import numpy as np
 from ivl import assess, experiment, four_leg, native
 from ivl.campaign import make_manifest
 from ivl.layout import layout_of
-from ivl.learn import LearningRun
+from ivl.learning.loop import LearningRun, trials_of
 from ivl.plots import style
 from ivl.source import WorldSource
 from ivl.store import RunStore
@@ -168,7 +168,7 @@ def run_cell(
         with RunStore.create(
             folder, chosen.to_yaml(), manifest, native.library().outcome_dtype, layout_of(chosen)
         ) as store:
-            LearningRun(chosen, WorldSource(world, chosen, threads), store, n_trials).run()
+            LearningRun(trials_of(chosen, n_trials), WorldSource(world, chosen, threads), store).run()
             verdicts = assess.judge(world, chosen, best, store.episodes(), store.rollouts(), threads)
         write(path, assess.summarise(verdicts) | {"verdicts": [asdict(v) for v in verdicts]})
         shutil.rmtree(folder)

@@ -2,14 +2,14 @@
 
 Definitions, the same for every learner:
 
-best rate: The largest four-leg rate that any policy reaches in this world, by a dense grid over (RREV_c, M_yd). The
+best rate: The largest four-leg rate that any policy reaches in this world, by a dense grid over its parameters. The
     grid is refined in stages (more rollouts for the better points); the last stage flies fresh rollouts, so that the
     figure is not inflated by having been selected.
 check: After each episode the recommended policy flies `n_fresh` fresh rollouts (random numbers of the check alone).
-solved: The check after the last episode reaches `share_of_best` of the best rate.
+solved: The check after the last episode reaches `share_of_best` of the best rate (`ivl.outcome.solved`).
 converged at: The first multiple of N rollouts from which on every check reaches it.
 failed: Rollouts up to convergence (all of them if never) that were not four-leg landings: what a drone would suffer.
-stuck: Trials whose recommended policy at the end lands at less than half of the best rate.
+stuck: Trials whose recommended policy at the end is stuck by the best rate (`ivl.outcome.stuck`).
 """
 
 from collections.abc import Callable, Sequence
@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ivl.experiment import Experiment, GridAxis
-from ivl.outcome import clean, four_leg
+from ivl.experiment import POLICY, Experiment, GridAxis
+from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
+from ivl.outcome import clean, four_leg, solved, stuck
 from ivl.seeds import Purpose, derive
-from ivl.store import SCORED, EpisodeRow, RolloutRows
+from ivl.source import by_parameter
 from ivl.world import World
 
-STUCK_SHARE = 0.5
 _STAGES = ((1.0, 8), (0.1, 64), (0.01, 400))
 """(share of the grid points that fly on, rollouts of each), added to what they flew before."""
 _FINALISTS, _FINAL_ROLLOUTS = 10, 1000
@@ -39,13 +39,13 @@ class Best:
     """The best policy of a world and approach.
 
     Attributes:
-        theta: The policy (RREV_c in 1/s, M_yd in N mm).
+        theta: The policy, in the order and units of the experiment's policy.
         rate_four_leg: Its four-leg rate.
         rate_clean: Its clean rate.
         n_rollouts: Rollouts spent on the search.
     """
 
-    theta: tuple[float, float]
+    theta: tuple[float, ...]
     rate_four_leg: float
     rate_clean: float
     n_rollouts: int
@@ -90,7 +90,7 @@ def find_best(
         on_stage: Called with (stage, number of stages) before each.
     """
     check = experiment.check
-    theta = _grid(check.rrev_c_per_s, check.moment_y_Nmm)
+    theta = _grid([getattr(check, name) for name in POLICY])
     landed, flown = np.zeros(len(theta)), np.zeros(len(theta))
     chosen, stream = np.arange(len(theta)), 0
     for stage, (share, n_full) in enumerate((*_STAGES, (0.0, _FINAL_ROLLOUTS))):
@@ -104,8 +104,7 @@ def find_best(
         flown[chosen] += n_each
         stream += len(chosen) * n_each
     top = int(np.argmax(four))  # of the fresh rollouts of the last stage alone
-    policy = (float(theta[chosen[top], 0]), float(theta[chosen[top], 1]))
-    return Best(policy, float(four[top]), float(spotless[top]), stream)
+    return Best(tuple(theta[chosen[top]].tolist()), float(four[top]), float(spotless[top]), stream)
 
 
 def judge(
@@ -121,7 +120,6 @@ def judge(
     The checks are flown from the last one backwards, each trial until its first failure: earlier ones cannot change
     its verdict.
     """
-    needed = experiment.check.share_of_best * best.rate_four_leg
     recommended = _recommendations(history, experiment.n_episodes)
     n_trials, last = len(recommended), experiment.n_episodes - 1
     converged = np.full(n_trials, -1)
@@ -133,7 +131,7 @@ def judge(
         four, spotless = _check(world, experiment, recommended[alive, episode], alive, episode, threads)
         if episode == last:
             final_four, final_clean = four, spotless
-        alive = alive[four >= needed]
+        alive = alive[solved(four, best.rate_four_leg, experiment.check.share_of_best)]
         converged[alive] = episode
     return [
         _verdict(trial, experiment, int(converged[trial]), final_four[trial], final_clean[trial], best, rollouts)
@@ -160,9 +158,10 @@ def summarise(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     }
 
 
-def _grid(rrev: GridAxis, moment: GridAxis) -> FloatArray:
-    axes = [axis.lo + axis.step * np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1) for axis in (rrev, moment)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+def _grid(axes: Sequence[GridAxis]) -> FloatArray:
+    """Every combination of the axes' values, shape (m, dim)."""
+    values = [axis.lo + axis.step * np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1) for axis in axes]
+    return np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
 
 
 def _rates(
@@ -173,8 +172,7 @@ def _rates(
     outcomes = world.rollouts(
         experiment.speed_mps,
         experiment.angle_deg,
-        theta[:, :1],
-        theta[:, 1:],
+        **by_parameter(theta[:, None]),
         seed=derive(experiment.seed, Purpose.GRID),
         stream=stream,
         start=experiment.start,
@@ -197,8 +195,7 @@ def _check(
     outcomes = world.rollouts(
         experiment.speed_mps,
         experiment.angle_deg,
-        theta[:, :1],
-        theta[:, 1:],
+        **by_parameter(theta[:, None]),
         seed=seed[:, None],
         stream=episode * n_fresh + np.arange(n_fresh),
         start=experiment.start,
@@ -208,9 +205,9 @@ def _check(
 
 
 def _recommendations(history: Sequence[EpisodeRow], n_episodes: int) -> FloatArray:
-    """Recommended policy after each episode, shape (n_trials, n_episodes, 2); one that stopped keeps its last."""
+    """Recommended policy after each episode, shape (n_trials, n_episodes, dim); one that stopped keeps its last."""
     n_trials = 1 + max(row.trial for row in history)
-    theta = np.full((n_trials, n_episodes, 2), np.nan)
+    theta = np.full((n_trials, n_episodes, len(history[0].recommended)), np.nan)
     for row in history:
         theta[row.trial, row.episode :] = row.recommended
     return theta
@@ -219,21 +216,21 @@ def _recommendations(history: Sequence[EpisodeRow], n_episodes: int) -> FloatArr
 def _verdict(
     trial: int, experiment: Experiment, episode: int, four: float, spotless: float, best: Best, rollouts: RolloutRows
 ) -> Verdict:
-    solved = episode >= 0
-    n_until = (episode + 1) * experiment.n_rollouts if solved else experiment.budget
+    converged = episode >= 0
+    n_until = (episode + 1) * experiment.n_rollouts if converged else experiment.budget
     own = (rollouts.trial == trial) & (rollouts.status == SCORED)
     until = own & (rollouts.episode * experiment.n_rollouts + rollouts.idx < n_until)
     failed = ~four_leg(rollouts.outcomes)
     return Verdict(
         trial=trial,
-        solved=solved,
-        rollouts_to_convergence=n_until if solved else None,
+        solved=converged,
+        rollouts_to_convergence=n_until if converged else None,
         rate_four_leg=float(four),
         rate_clean=float(spotless),
         failed_landings=int((failed & until).sum()),
         failed_landings_total=int((failed & own).sum()),
         body_contacts=int(((rollouts.outcomes["body_contact"] != 0) & until).sum()),
-        stuck=bool(four < STUCK_SHARE * best.rate_four_leg),
+        stuck=bool(stuck(four, best.rate_four_leg)),
     )
 
 

@@ -22,11 +22,12 @@ from ivl import assess, experiment, links, native, yamlfile
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
-from ivl.learn import LearningRun, Progress, recent_rate
+from ivl.learning.loop import LearningRun, Progress, recent_rate, trials_of
+from ivl.learning.recorder import DISCARDED, SCORED, EpisodeRow, RolloutRows
 from ivl.links.options import Options
 from ivl.outcome import four_leg
 from ivl.source import RolloutSource, WorldSource
-from ivl.store import DISCARDED, SCHEMA_VERSION, SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest, write_json
+from ivl.store import SCHEMA_VERSION, RunStore, read_manifest, write_json
 from ivl.world import World
 
 _MUST_MATCH = ("trials", "uri", "config_sha256", "model_sha256", "library_sha256")
@@ -109,7 +110,7 @@ def run(
         store = stack.enter_context(_open(folder, chosen, manifest, resume))
         if hooks.on_start:
             hooks.on_start(folder)
-        LearningRun(chosen, source, store, n_trials or 1).run(hooks.on_episode)
+        LearningRun(trials_of(chosen, n_trials or 1), source, store).run(hooks.on_episode)
         source.close()
         history, rollouts = store.episodes(), store.rollouts()
         best = _best(folder, world, chosen, threads, hooks)

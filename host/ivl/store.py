@@ -16,9 +16,8 @@ import json
 import math
 import os
 import sqlite3
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,67 +26,20 @@ import numpy.typing as npt
 
 from ivl.errors import StoreError
 from ivl.layout import Layout
+from ivl.learning.recorder import DISCARDED, PLANNED, SCORED, EpisodeRow, RolloutRows
 from ivl.outcome import Outcomes
 from ivl.quantity import Quantity
 from ivl.rewards.base import TOTAL, Terms
 
 SCHEMA_VERSION = 2
-PLANNED, SCORED, DISCARDED = "planned", "scored", "discarded"
 
 _ROLLOUT_KEY = "trial INTEGER, episode INTEGER, idx INTEGER"
 _SEARCH = ("mu", "sigma", "recommended")
 _EPISODE_FIGURES = {"reward_mean": "REAL", "rate_four_leg": "REAL", "rate_clean": "REAL", "stopped": "INTEGER"}
 
 
-@dataclass(frozen=True)
-class RolloutRows:
-    """Rollouts of one or more trials as read back, in the order (trial, episode, idx).
-
-    Attributes:
-        trial: Trial of each rollout, shape (n,).
-        episode: Episode within the trial, shape (n,).
-        idx: Place within the episode, shape (n,).
-        stream: Random stream, shape (n,).
-        status: "planned", "scored" or "discarded", shape (n,).
-        theta: Policies, shape (n, dim).
-        reward: Return, shape (n,), NaN if not flown.
-        outcomes: Outcome records, shape (n,); NaN and zero if not flown.
-        terms: Terms of the return by name, shape (n,) each, NaN if not flown.
-    """
-
-    trial: npt.NDArray[np.int64]
-    episode: npt.NDArray[np.int64]
-    idx: npt.NDArray[np.int64]
-    stream: npt.NDArray[np.uint64]
-    status: npt.NDArray[np.str_]
-    theta: npt.NDArray[np.float64]
-    reward: npt.NDArray[np.float64]
-    outcomes: Outcomes
-    terms: dict[str, npt.NDArray[np.float64]] = field(default_factory=dict)
-
-    def __len__(self) -> int:
-        """Number of rollouts."""
-        return len(self.trial)
-
-
-@dataclass(frozen=True)
-class EpisodeRow:
-    """What is kept of one finished episode of one trial; arrays have one element per policy parameter."""
-
-    trial: int
-    episode: int
-    n_scored: int
-    mu: tuple[float, ...]
-    sigma: tuple[float, ...]
-    recommended: tuple[float, ...]
-    reward_mean: float
-    rate_four_leg: float
-    rate_clean: float
-    stopped: bool
-
-
 class RunStore:
-    """One run folder, open for writing by this process alone.
+    """One run folder, open for writing by this process alone: the recorder of a run that may be killed.
 
     Attributes:
         folder: The run folder.
@@ -177,19 +129,14 @@ class RunStore:
         self.close()
 
     def plan(
-        self, episode: int, trials: Sequence[int], stream: npt.NDArray[np.uint64], theta:
-        Sequence[npt.NDArray[np.float64]],
-        states: Sequence[Mapping[str, Any]],
-    ) -> None:  # fmt: skip
-        """Commit the policies of one episode, before any is flown, with the learners' states after `ask`.
-
-        Args:
-            episode: Number of the episode.
-            trials: Trials that take part.
-            stream: Random stream of each rollout, shape (n_rollouts,), the same in every trial.
-            theta: For each trial the policies, shape (n_rollouts, dim).
-            states: For each trial the learner's state.
-        """
+        self,
+        episode: int,
+        trials: Sequence[int],
+        stream: npt.NDArray[np.uint64],
+        theta: Sequence[npt.NDArray[np.float64]],
+        states: Iterable[Mapping[str, Any]],
+    ) -> None:
+        """Commit the policies of one episode, before any is flown, with the learners' states after `ask`."""
         rows = [
             (trial, episode, idx, int(stream[idx]), PLANNED, *policy)
             for trial, policies in zip(trials, theta, strict=True)
@@ -201,15 +148,18 @@ class RunStore:
             self._save_states(trials, states)
 
     def score(
-        self, keys: Sequence[tuple[int, int, int]], outcomes: Outcomes, terms: Terms, discarded: str = ""
+        self,
+        episode: int,
+        trial: npt.NDArray[np.int64],
+        idx: npt.NDArray[np.int64],
+        outcomes: Outcomes,
+        terms: Terms,
+        discarded: str = "",
     ) -> None:
         """Commit the outcomes of some planned rollouts.
 
-        Args:
-            keys: (trial, episode, idx) of each.
-            outcomes: Outcome records, shape (n,).
-            terms: The return, `total`, and the reward's terms by name, shape (n,) each.
-            discarded: Reason why they must not count; empty if they do.
+        Raises:
+            StoreError: One of them was not planned, or is scored already; then none is committed.
         """
         rewards = self._reward_columns()
         names = ("status", "discarded", *rewards.values(), *self._outcome_columns)
@@ -221,8 +171,8 @@ class RunStore:
         columns = [terms[name].tolist() for name in rewards]
         columns += self._flatten(outcomes)
         rows = [
-            (status, discarded, *map(_to_sql, values), *key)
-            for values, key in zip(zip(*columns, strict=True), keys, strict=True)
+            (status, discarded, *map(_to_sql, values), of_trial, episode, place)
+            for values, of_trial, place in zip(zip(*columns, strict=True), trial.tolist(), idx.tolist(), strict=True)
         ]
         with self._transaction():
             changed = self._db.executemany(update, rows).rowcount
@@ -231,7 +181,7 @@ class RunStore:
                     f"{self.folder}: {len(rows) - changed} of {len(rows)} scored rollouts were not planned"
                 )
 
-    def finish_episode(self, rows: Sequence[EpisodeRow], states: Sequence[Mapping[str, Any]]) -> None:
+    def finish_episode(self, rows: Sequence[EpisodeRow], states: Iterable[Mapping[str, Any]]) -> None:
         """Commit one episode of some trials: its figures and the learners' states after `tell`, in one transaction."""
         values = [
             (r.trial, r.episode, r.n_scored, *r.mu, *r.sigma, *r.recommended,
@@ -321,7 +271,7 @@ class RunStore:
         )
         return Layout(policy, terms)
 
-    def _save_states(self, trials: Sequence[int], states: Sequence[Mapping[str, Any]]) -> None:
+    def _save_states(self, trials: Sequence[int], states: Iterable[Mapping[str, Any]]) -> None:
         rows = [(trial, json.dumps(state, allow_nan=False)) for trial, state in zip(trials, states, strict=True)]
         self._db.executemany("INSERT OR REPLACE INTO learner(trial, state) VALUES(?,?)", rows)
 

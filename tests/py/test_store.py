@@ -13,9 +13,10 @@ import pytest
 from ivl import native, store
 from ivl.errors import StoreError
 from ivl.layout import Layout
+from ivl.learning.recorder import EpisodeRow
 from ivl.quantity import Quantity
 from ivl.rewards import RewardChoice
-from ivl.store import EpisodeRow, RunStore
+from ivl.store import RunStore
 
 DTYPE = native.library().outcome_dtype
 MANIFEST = {"schema_version": store.SCHEMA_VERSION, "seed": 0}
@@ -49,7 +50,9 @@ def plan(run: RunStore, episode: int = 0, trials: tuple[int, ...] = (0, 1)) -> N
 
 def score(run: RunStore, keys: list[tuple[int, int, int]], discarded: str = "") -> None:
     records = outcomes(len(keys))
-    run.score(keys, records, PAPER.score(records), discarded)
+    trial, episode, idx = np.array(keys).T
+    assert len(set(episode.tolist())) == 1
+    run.score(int(episode[0]), trial, idx, records, PAPER.score(records), discarded)
 
 
 def row(trial: int, episode: int) -> EpisodeRow:
@@ -126,7 +129,7 @@ def test_scoring_what_was_not_planned_or_is_scored_already_is_refused_as_a_whole
     plan(run)
     score(run, [(0, 0, 0)])
     with pytest.raises(StoreError, match="were not planned"):
-        score(run, [(0, 0, 1), key])
+        score(run, [(0, key[1], 1), key])
     assert run.rollouts(trial=0).status.tolist() == ["scored", "planned", "planned"]
 
 

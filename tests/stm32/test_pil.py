@@ -13,7 +13,7 @@ from ivl import campaign, experiment
 from ivl.cli import run as cli
 from ivl.errors import ConfigError, RolloutError
 from ivl.layout import layout_of
-from ivl.learn import LearningRun
+from ivl.learning.loop import LearningRun
 from ivl.links import open_source, pil
 from ivl.native import library
 from ivl.source import Plan, WorldSource
@@ -81,7 +81,7 @@ def test_learning_in_the_loop_ends_with_the_same_policy_bit_for_bit(tmp_path: Pa
 def _learn(chosen, source, folder):
     manifest = campaign.make_manifest(chosen, chosen.make_world(), None)
     with RunStore.create(folder, chosen.to_yaml(), manifest, library().outcome_dtype, layout_of(chosen)) as store:
-        LearningRun(chosen, source, store).run()
+        LearningRun([chosen], source, store).run()
         return store.episodes(), store.rollouts()
 
 

@@ -9,8 +9,9 @@ from ivl import campaign, landing, model, native
 from ivl.errors import ConfigError, StoreError
 from ivl.export.flight import Flight, of_file, of_spec
 from ivl.landing import LandingSpec
+from ivl.learning.recorder import SCORED
 from ivl.rewards import RewardChoice
-from ivl.store import SCORED, RunStore, read_manifest
+from ivl.store import RunStore, read_manifest
 from ivl.world import World
 
 

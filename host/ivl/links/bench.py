@@ -9,7 +9,7 @@ import numpy as np
 from ivl import campaign, experiment, native
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
-from ivl.learn import LearningRun
+from ivl.learning.loop import LearningRun
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.silproc import SilProcess
 from ivl.source import Plan, RolloutSource, WorldSource
@@ -56,5 +56,5 @@ def _learn(chosen: Experiment, source: RolloutSource) -> float:
         dtype = native.library().outcome_dtype
         with RunStore.create(Path(folder) / "run", chosen.to_yaml(), manifest, dtype, layout_of(chosen)) as store:
             began_s = time.monotonic()
-            LearningRun(chosen, source, store).run()
+            LearningRun([chosen], source, store).run()
             return time.monotonic() - began_s

@@ -10,12 +10,13 @@ import numpy as np
 from ivl import campaign, landing, native
 from ivl.errors import StoreError
 from ivl.experiment import POLICY, Experiment
+from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
 from ivl.outcome import four_leg
 from ivl.plots.convergence import outcome_classes
 from ivl.report import replay
 from ivl.report.landings import Album, thinned
 from ivl.report.page import axis_from_zero, encode, fine_unit, flatten, learner_words, reward_names
-from ivl.store import SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest
+from ivl.store import RunStore, read_manifest
 
 
 def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], None]) -> tuple[dict[str, Any], Album]:

@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
 from ivl.analysis.claims import evaluate
-from ivl.analysis.rates import CLEAN_RATE, RATE, SOLVED_RATE, cell_rates, rollouts_to_rate
+from ivl.analysis.rates import CLEAN_RATE, RATE, cell_rates, rollouts_to_rate
 from ivl.errors import StoreError
 from ivl.landing import LandingSpec
+from ivl.outcome import SOLVED_SHARE, solved
 from ivl.report import replay
 from ivl.report.landings import Album, thinned
 from ivl.report.page import axis_from_zero, encode, fine_unit, flatten, learner_words, reward_names
@@ -114,14 +115,14 @@ def _is_recorded(sweep: Sweep, trial: pd.Series) -> Callable[[Any], bool]:
 
 
 def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list[str]]:
-    n_solved = int((cells["rate_best_norm"] >= SOLVED_RATE).sum())
+    n_solved = int(solved(cells["rate_best_norm"]).sum())
     return [
         ["Vehicle and gears", f"{sweep.vehicle}, {sweep.gear_set}"],
         ["Learner", learner_words(sweep.learner.name)],
         ["Cells and trials", f"{len(cells)} cells, {_finished(sweep, trials)} trials"],
         ["Rollouts", f"{int(trials['n_rollouts'].sum()):,}"],
         ["Mean landing rate", f"{100 * cells['rate_mean_norm'].mean():.1f} %"],
-        [f"Cells with a trial of {100 * SOLVED_RATE:.0f} % or more", f"{n_solved} of {len(cells)}"],
+        [f"Cells with a trial of {100 * SOLVED_SHARE:.0f} % or more", f"{n_solved} of {len(cells)}"],
         ["Seed", str(sweep.seed)],
     ]
 

@@ -16,8 +16,9 @@ from ivl.flight.log import Format, Given, Log, with_rules
 from ivl.flight.phases import plane, trigger
 from ivl.flight.store import Flight, make_flight
 from ivl.flight.table import Rule
+from ivl.learning.recorder import SCORED, RolloutRows
 from ivl.seeds import Purpose, derive
-from ivl.store import SCORED, RolloutRows, RunStore
+from ivl.store import RunStore
 
 JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
 
