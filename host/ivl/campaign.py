@@ -27,7 +27,7 @@ from ivl.learning.recorder import DISCARDED, SCORED, EpisodeRow, RolloutRows
 from ivl.links.options import Options
 from ivl.outcome import four_leg
 from ivl.source import RolloutSource, WorldSource
-from ivl.store import SCHEMA_VERSION, RunStore, read_manifest, write_json
+from ivl.store import SCHEMA_VERSION, RunStore, check_version, read_manifest, write_json
 from ivl.world import World
 
 _MUST_MATCH = ("trials", "uri", "config_sha256", "model_sha256", "library_sha256")
@@ -137,8 +137,14 @@ def _open_source(
 
 
 def read_config(folder: Path) -> tuple[Experiment, int | None]:
-    """The experiment and the number of trials of an existing run folder."""
+    """The experiment and the number of trials of an existing run folder.
+
+    Raises:
+        StoreError: There is no run, or another version of this program wrote it.
+        ConfigError: Its configuration is damaged.
+    """
     manifest = read_manifest(folder)
+    check_version(folder, manifest, SCHEMA_VERSION)  # before the configuration, which may have changed its form too
     data = yamlfile.read(folder / "config.yaml")
     return experiment.from_data(data, str(folder / "config.yaml")), manifest.get("trials")
 
@@ -204,6 +210,7 @@ def _open(folder: Path, chosen: Experiment, manifest: dict[str, Any], resume: bo
             raise StoreError(f"{folder}: there is no run to resume")
         return RunStore.create(folder, chosen.to_yaml(), manifest, dtype, layout)
     old = read_manifest(folder)
+    check_version(folder, old, SCHEMA_VERSION)
     for key in _MUST_MATCH:
         if old.get(key) != manifest[key]:
             raise StoreError(f"{folder}: cannot be resumed: {_difference(folder, key, old, manifest, chosen)}")

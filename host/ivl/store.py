@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+import ivl
 from ivl.errors import StoreError
 from ivl.layout import Layout
 from ivl.learning.recorder import DISCARDED, PLANNED, SCORED, EpisodeRow, RolloutRows
@@ -103,10 +104,7 @@ class RunStore:
         Raises:
             StoreError: There is no run, it is of another schema version, or another process has it open.
         """
-        manifest = read_manifest(folder)
-        if manifest.get("schema_version") != SCHEMA_VERSION:
-            version = manifest.get("schema_version")
-            raise StoreError(f"{folder}: schema version {version!r}, this program reads {SCHEMA_VERSION}")
+        check_version(folder, read_manifest(folder), SCHEMA_VERSION)
         store = cls(folder, outcome_dtype, lock_folder(folder))
         known = [row[1] for row in store._db.execute("PRAGMA table_info(rollout)")]
         if not known or [c for c in known if c.startswith("out_")] != list(store._outcome_columns):
@@ -323,6 +321,26 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if not isinstance(manifest, dict):
         raise StoreError(f"{path}: expected an object")
     return manifest
+
+
+def check_version(folder: Path | str, manifest: Mapping[str, Any], schema_version: int) -> None:
+    """Refuse a folder whose files another version of this program wrote in another form.
+
+    Args:
+        folder: Run folder of `ivl learn`, `ivl sweep` or `ivl map`.
+        manifest: Its manifest.
+        schema_version: Version of the form that this program reads and writes in folders of that kind.
+
+    Raises:
+        StoreError: The folder's form is another one.
+    """
+    found = manifest.get("schema_version")
+    if found != schema_version:
+        writer = manifest.get("ivl_version", "of unknown version")
+        raise StoreError(
+            f"{folder}: written by ivl {writer} with schema version {found}; "
+            f"this is ivl {ivl.__version__}, which reads schema version {schema_version} alone"
+        )
 
 
 def write_json(path: Path, data: Any) -> None:

@@ -213,7 +213,7 @@ def test_a_run_is_locked_against_other_processes_until_its_process_ends(run: Run
         (None, "holds no run"),
         ("{", "cannot be read"),
         ("[]", "expected an object"),
-        ('{"schema_version": 99}', "schema version 99, this program reads"),
+        ('{"schema_version": 99}', "ivl of unknown version with schema version 99; this is ivl"),
     ],
 )
 def test_a_folder_that_cannot_be_continued_is_refused(tmp_path: Path, text: str | None, message: str) -> None:

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from small_sweep import MAP, fly, make, write
 
 import ivl
+from ivl import report
 from ivl.errors import StoreError
 from ivl.layout import layout_of
 from ivl.sweep import config, folder, schema, store
@@ -130,6 +132,28 @@ def test_a_table_that_does_not_exist_is_refused_and_one_without_parts_is_empty(s
     with pytest.raises(StoreError, match="no table 'people'"):
         store.read_table(tmp_path / "run", "people")
     assert store.read_trials(tmp_path / "run").empty
+
+
+def test_a_sweep_of_an_older_version_is_refused_in_one_line_that_names_both(
+    small: Sweep, small_map: PolicyMap, tmp_path: Path
+) -> None:
+    for grid in (small, small_map):
+        run = tmp_path / grid.name
+        worlds = {gear: grid.make_world(gear) for gear in grid.gear_names()}
+        folder.open_run(run, grid, worlds, 100, resume=False).close()
+        manifest = json.loads((run / "manifest.json").read_text())
+        del manifest["layout"]  # as in version 1
+        (run / "manifest.json").write_text(json.dumps({**manifest, "schema_version": 1, "ivl_version": "0.0.9"}))
+        line = f"{run}: written by ivl 0.0.9 with schema version 1; this is ivl {ivl.__version__}, which reads schema"
+        for use in (
+            lambda run=run: store.read_trials(run),
+            lambda run=run, grid=grid, worlds=worlds: folder.open_run(run, grid, worlds, 100, resume=True),
+        ):
+            with pytest.raises(StoreError) as caught:
+                use()
+            assert str(caught.value) == f"{line} version {schema.SCHEMA_VERSION} alone"
+    with pytest.raises(StoreError, match=r"written by ivl 0\.0\.9 with schema version 1"):
+        report.write(tmp_path / "small")
 
 
 def test_the_manifest_says_what_was_run(reference: Path, small: Sweep) -> None:

@@ -17,7 +17,7 @@ import xarray as xr
 
 from ivl.errors import StoreError
 from ivl.layout import Layout
-from ivl.store import write_durably
+from ivl.store import check_version, write_durably
 from ivl.sweep import schema
 from ivl.sweep.schema import CELL, KINDS, SCHEMA_VERSION, TASKS, TRIAL_KEY, VERSION_KEY
 
@@ -46,9 +46,7 @@ def read_manifest(run: Path | str) -> dict[str, Any]:
         raise StoreError(f"{path}: cannot be read: {error}") from error
     if not isinstance(manifest, dict) or not {"sweep", "map"} & set(manifest):
         raise StoreError(f"{path}: is not the manifest of a sweep or map")
-    if manifest.get("schema_version") != SCHEMA_VERSION:
-        version = manifest.get("schema_version")
-        raise StoreError(f"{path}: schema_version {version!r}, this program reads {SCHEMA_VERSION}")
+    check_version(run, manifest, SCHEMA_VERSION)
     return manifest
 
 
