@@ -17,13 +17,15 @@ from pathlib import Path
 from ivl import campaign, experiment, native
 from ivl.errors import IvlError
 from ivl.experiment import Experiment
-from ivl.learn import LearningRun
+from ivl.layout import layout_of
+from ivl.learning.loop import LearningRun
+from ivl.learning.recorder import SCORED
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.fields import SilField
 from ivl.links.options import Options
 from ivl.silproc import SilProcess
 from ivl.source import WorldSource
-from ivl.store import SCORED, RunStore
+from ivl.store import RunStore
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "RELIABILITY.md"
@@ -109,8 +111,10 @@ def rows_of(folder: Path) -> list[Rows]:
 def learn(chosen: Experiment, folder: Path, source: CrazyflieSource | WorldSource) -> None:
     """Learn, without judging what was learned."""
     manifest = campaign.make_manifest(chosen, chosen.make_world())
-    with RunStore.create(folder, chosen.to_yaml(), manifest, native.library().outcome_dtype) as store:
-        LearningRun(chosen, source, store).run()
+    with RunStore.create(
+        folder, chosen.to_yaml(), manifest, native.library().outcome_dtype, layout_of(chosen)
+    ) as store:
+        LearningRun([chosen], source, store).run()
 
 
 @contextmanager

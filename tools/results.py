@@ -23,7 +23,8 @@ import numpy as np
 
 from ivl import assess, experiment, four_leg, native
 from ivl.campaign import make_manifest
-from ivl.learn import LearningRun
+from ivl.layout import layout_of
+from ivl.learning.loop import LearningRun, trials_of
 from ivl.plots import style
 from ivl.source import WorldSource
 from ivl.store import RunStore
@@ -164,8 +165,10 @@ def run_cell(
         folder = path.with_suffix("")
         shutil.rmtree(folder, ignore_errors=True)
         manifest = make_manifest(chosen, world, n_trials)
-        with RunStore.create(folder, chosen.to_yaml(), manifest, native.library().outcome_dtype) as store:
-            LearningRun(chosen, WorldSource(world, chosen, threads), store, n_trials).run()
+        with RunStore.create(
+            folder, chosen.to_yaml(), manifest, native.library().outcome_dtype, layout_of(chosen)
+        ) as store:
+            LearningRun(trials_of(chosen, n_trials), WorldSource(world, chosen, threads), store).run()
             verdicts = assess.judge(world, chosen, best, store.episodes(), store.rollouts(), threads)
         write(path, assess.summarise(verdicts) | {"verdicts": [asdict(v) for v in verdicts]})
         shutil.rmtree(folder)

@@ -21,11 +21,13 @@ import ivl
 from ivl import assess, experiment, links, native, yamlfile
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
-from ivl.learn import LearningRun, Progress, recent_rate
+from ivl.layout import layout_of
+from ivl.learning.loop import LearningRun, Progress, recent_rate, trials_of
+from ivl.learning.recorder import DISCARDED, SCORED, EpisodeRow, RolloutRows
 from ivl.links.options import Options
 from ivl.outcome import four_leg
 from ivl.source import RolloutSource, WorldSource
-from ivl.store import DISCARDED, SCHEMA_VERSION, SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest, write_json
+from ivl.store import SCHEMA_VERSION, RunStore, check_version, read_manifest, write_json
 from ivl.world import World
 
 _MUST_MATCH = ("trials", "uri", "config_sha256", "model_sha256", "library_sha256")
@@ -108,7 +110,7 @@ def run(
         store = stack.enter_context(_open(folder, chosen, manifest, resume))
         if hooks.on_start:
             hooks.on_start(folder)
-        LearningRun(chosen, source, store, n_trials or 1).run(hooks.on_episode)
+        LearningRun(trials_of(chosen, n_trials or 1), source, store).run(hooks.on_episode)
         source.close()
         history, rollouts = store.episodes(), store.rollouts()
         best = _best(folder, world, chosen, threads, hooks)
@@ -135,8 +137,14 @@ def _open_source(
 
 
 def read_config(folder: Path) -> tuple[Experiment, int | None]:
-    """The experiment and the number of trials of an existing run folder."""
+    """The experiment and the number of trials of an existing run folder.
+
+    Raises:
+        StoreError: There is no run, or another version of this program wrote it.
+        ConfigError: Its configuration is damaged.
+    """
     manifest = read_manifest(folder)
+    check_version(folder, manifest, SCHEMA_VERSION)  # before the configuration, which may have changed its form too
     data = yamlfile.read(folder / "config.yaml")
     return experiment.from_data(data, str(folder / "config.yaml")), manifest.get("trials")
 
@@ -196,15 +204,23 @@ def make_manifest(
 
 def _open(folder: Path, chosen: Experiment, manifest: dict[str, Any], resume: bool) -> RunStore:
     dtype = native.library().outcome_dtype
+    layout = layout_of(chosen)
     if not resume or not (folder / "manifest.json").exists():
         if resume and not folder.exists():
             raise StoreError(f"{folder}: there is no run to resume")
-        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype)
+        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype, layout)
     old = read_manifest(folder)
+    check_version(folder, old, SCHEMA_VERSION)
     for key in _MUST_MATCH:
         if old.get(key) != manifest[key]:
             raise StoreError(f"{folder}: cannot be resumed: {_difference(folder, key, old, manifest, chosen)}")
-    return RunStore.open_existing(folder, dtype)
+    store = RunStore.open_existing(folder, dtype)
+    if store.layout != layout:
+        store.close()
+        raise StoreError(
+            f"{folder}: cannot be resumed: the terms of its reward or the parameters of its policy changed"
+        )
+    return store
 
 
 def _difference(folder: Path, key: str, old: dict[str, Any], new: dict[str, Any], chosen: Experiment) -> str:

@@ -13,7 +13,7 @@ from pydantic import ConfigDict, Field, model_validator
 from ivl import forms, yamlfile
 from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
-from ivl.reward import REWARDS, RewardOptions
+from ivl.rewards import RewardChoice
 from ivl.settings import PACKAGE_DIR, Finite, Strict, apply_setting, check_overrides, locate, read_mapping
 from ivl.task import Task
 
@@ -37,6 +37,13 @@ class PerParameter(Strict):
 
     model_config = ConfigDict(strict=True, extra="allow", frozen=True)
     __pydantic_extra__: dict[str, Any] = Field(init=False)
+
+    @classmethod
+    def further_paths(cls) -> dict[str, bool]:
+        """Paths of the fields that any form gives, as `yamlfile.paths` tells them."""
+        names = [name for form in forms.forms().values() for name in form.names]
+        below = yamlfile.paths(PolicyParameter) if cls is Policy else {}
+        return {path: False for name in names for path in (name, *(f"{name}.{field}" for field in below))}
 
     def of(self, form: forms.Form, where: str) -> list[Any]:
         """The fields of a form's parameters, in its order.
@@ -86,19 +93,6 @@ class LearnerChoice(Strict):
 
     name: str
     options: dict[str, Any] = Field(default_factory=dict)
-
-
-class RewardChoice(Strict):
-    """A reward by name, with its constants."""
-
-    name: str = "paper"
-    options: RewardOptions = RewardOptions()
-
-    @model_validator(mode="after")
-    def _known(self) -> Self:
-        if self.name not in REWARDS:
-            raise ValueError(f"no reward {self.name!r} (allowed {', '.join(REWARDS)})")
-        return self
 
 
 class GridAxis(Strict):

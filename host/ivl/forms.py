@@ -92,7 +92,9 @@ class Form:
             good = (column >= p.lo) & (column <= p.hi)
             if not good.all():
                 value = float(column[~good].flat[0])
-                raise ArgumentError(f"{p.name}: value {value!r} is out of range (allowed {p.lo:g} .. {p.hi:g} {p.unit})")
+                raise ArgumentError(
+                    f"{p.name}: value {value!r} is out of range (allowed {p.lo:g} .. {p.hi:g} {p.unit})"
+                )
         si: npt.NDArray[np.float64] = np.array([p.si for p in self.params])
         return values * si
 

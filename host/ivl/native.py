@@ -144,7 +144,7 @@ class NativeLibrary:
         return NativeModel(self, values)
 
     def forms(self) -> list[tuple[str, str, tuple[tuple[str, Field], ...]]]:
-        """Forms of policies by number: name, description, parameters with symbol (range in SI; `default`: one unit in SI)."""
+        """Forms by number: name, description, parameters with symbol (range in SI; `default`: one unit in SI)."""
         found: list[tuple[str, str, tuple[tuple[str, Field], ...]]] = []
         name, doc = ctypes.c_char_p(), ctypes.c_char_p()
         while n := self._c.ivl_sil_form(len(found), ctypes.byref(name), ctypes.byref(doc)):
@@ -322,6 +322,7 @@ def library() -> NativeLibrary:
 
 def _declare(c: Any) -> None:
     u32p = ctypes.POINTER(ctypes.c_uint32)
+    textp = ctypes.POINTER(ctypes.c_char_p)
     ptr, size, c_int, double = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_double
     for name, restype, argtypes in (
         ("ivl_sil_table", ctypes.POINTER(_CField), (c_int, u32p, u32p)),
@@ -332,8 +333,8 @@ def _declare(c: Any) -> None:
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_replay", c_int, (ptr, ptr, c_int, ptr, ptr, size, ptr)),
-        ("ivl_sil_form", ctypes.c_uint32, (c_int, ctypes.POINTER(ctypes.c_char_p), ctypes.POINTER(ctypes.c_char_p))),
-        ("ivl_sil_form_param", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField), ctypes.POINTER(ctypes.c_char_p))),
+        ("ivl_sil_form", ctypes.c_uint32, (c_int, textp, textp)),
+        ("ivl_sil_form_param", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField), textp)),
         ("ivl_sil_policy_accepted", c_int, (ptr, c_int, ptr)),
         ("ivl_sil_policy_crc", ctypes.c_uint32, (c_int, ptr)),
         ("ivl_sil_hover", c_int, (ptr, ptr, size, ptr, size, double, ptr, size)),

@@ -1,7 +1,13 @@
-"""What a rollout's outcome means: the project's definitions of success, on whole record arrays.
+"""What counts as success, of a rollout and of a policy: the project's only definitions, on whole arrays.
 
-`four_leg` is the paper's landing (its reward pools three and four legs); `clean` is that without body or rotor contact.
-A rollout that is not `valid` (the simulation broke down, the policy was refused) is no landing, whatever it says.
+A rollout has *landed* if `four_leg` says so, the paper's landing (its reward pools three and four legs); `clean` is
+that without body or rotor contact. A rollout that is not `valid` (the simulation broke down, the policy was refused) is
+no landing, whatever it says.
+
+A policy, or a trial that ends with it, has a landing rate. It has *solved* its task from a share of the possible rate
+on, and is *stuck* below another. What is possible is the best rate of any policy, where a search has found it
+(`ivl.assess`); where nobody has looked for it (a sweep), it counts as 1, and a trial is called stuck only in a cell
+that another trial has solved (`ivl.analysis.rates.of_solved_cells`).
 """
 
 from functools import cache
@@ -16,6 +22,11 @@ from ivl.errors import NativeError
 FOUR_LEG_MIN = 3
 INVALID_ENDS = ("refused", "not_finite", "step_limit")
 """Names of the ends after which an outcome says nothing about the policy."""
+
+SOLVED_SHARE, STUCK_SHARE = 0.8, 0.5
+"""Shares of the possible landing rate from which on a task is solved, and below which a policy is stuck."""
+RECENT_EPISODES = 3
+"""The landing rate of a trial while it learns is that of its last three episodes (as in the paper)."""
 
 BoolArray = npt.NDArray[np.bool_]
 Outcomes = npt.NDArray[np.void]
@@ -35,6 +46,16 @@ def four_leg(outcomes: Outcomes) -> BoolArray:
 def clean(outcomes: Outcomes) -> BoolArray:
     """True where at least three feet are stuck and neither body nor rotor touched the ceiling."""
     return np.asarray(four_leg(outcomes) & (outcomes["body_contact"] == 0))
+
+
+def solved(rate: Any, possible: Any = 1.0, share: float = SOLVED_SHARE) -> Any:
+    """Whether landing rates (a number, array or column) reach a share of the possible rate; NaN does not."""
+    return rate >= share * possible
+
+
+def stuck(rate: Any, possible: Any = 1.0) -> Any:
+    """Whether landing rates (a number, array or column) are below half of the possible rate; NaN is not."""
+    return rate < STUCK_SHARE * possible
 
 
 def folded_deg(angle_deg: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -119,6 +119,8 @@ def put(data: dict[str, Any], path: str, value: Any, source: str, label: str) ->
             raise ConfigError(f"{label}: {path}: {key} is a value, it has no field {last!r}")
         data[key] = dict(data[key])
         data = data[key]
+    if parents and last == "name" and data.get(last) != value:
+        data.pop("options", None)  # they belong to the reward or learner of the old name
     data[last] = value
 
 

@@ -17,14 +17,16 @@ class Plan:
     """Rollouts to fly, one per row.
 
     Attributes:
-        theta: Policies (RREV_c in 1/s, M_yd in N mm), shape (n, 2).
+        theta: Policies, shape (n, dim), in the order and units of the experiment's policy.
         seed: Seed of the random numbers of each rollout's trial, shape (n,).
         stream: Number of each rollout within its trial, shape (n,).
+        trial: Number of each rollout's trial within the run, shape (n,); None: all are of one trial.
     """
 
     theta: npt.NDArray[np.float64]
     seed: npt.NDArray[np.uint64]
     stream: npt.NDArray[np.uint64]
+    trial: npt.NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)
@@ -78,18 +80,28 @@ class WorldSource:
         outcomes = self.world.rollouts(
             experiment.speed_mps,
             experiment.angle_deg,
-            plan.theta[:, 0],
-            plan.theta[:, 1],
+            *by_parameter(plan.theta),
+            form=experiment.policy.form,
             seed=plan.seed,
             stream=plan.stream,
             start=experiment.start,
             threads=self._threads,
         )
-        good = valid(outcomes)
-        yield Flown(np.flatnonzero(good), outcomes[good])
-        if not good.all():
-            reasons = sorted({self.world.end_reason(code) for code in outcomes.end_reason[~good]})
-            yield Flown(np.flatnonzero(~good), outcomes[~good], f"simulation: {', '.join(reasons)}")
+        yield from portions(self.world, outcomes)
 
     def close(self) -> None:
         """Nothing to give back."""
+
+
+def by_parameter(theta: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:
+    """Policies, shape (..., dim), as the arguments of `World.rollouts`: an array of shape (...) per parameter."""
+    return tuple(np.moveaxis(theta, -1, 0))
+
+
+def portions(world: World, outcomes: Outcomes) -> Iterator[Flown]:
+    """A whole plan's outcomes: what is to be scored, and what the simulation could not bring to an end."""
+    good = valid(outcomes)
+    yield Flown(np.flatnonzero(good), outcomes[good])
+    if not good.all():
+        reasons = sorted({world.end_reason(code) for code in outcomes["end_reason"][~good]})
+        yield Flown(np.flatnonzero(~good), outcomes[~good], f"simulation: {', '.join(reasons)}")

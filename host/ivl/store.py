@@ -2,7 +2,7 @@
 
     config.yaml     the resolved experiment
     manifest.json   schema version, seed, trials, hashes of model and library, versions, units
-    run.sqlite      rollouts, episodes and learner states
+    run.sqlite      rollouts, episodes, learner states, and what the columns of policy and reward mean
 
 SQLite in WAL mode with synchronous=FULL: a commit is on the disk when it returns, and a transaction is there whole or
 not at all. An episode passes three commits: *planned* (policies and the learners' states after `ask`), *scored* (each
@@ -16,86 +16,38 @@ import json
 import math
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+import ivl
 from ivl.errors import StoreError
+from ivl.layout import Layout
+from ivl.learning.recorder import DISCARDED, PLANNED, SCORED, EpisodeRow, RolloutRows
 from ivl.outcome import Outcomes
-from ivl.reward import Reward
+from ivl.quantity import Quantity
+from ivl.rewards.base import TOTAL, Terms
 
-SCHEMA_VERSION = 1
-PLANNED, SCORED, DISCARDED = "planned", "scored", "discarded"
+SCHEMA_VERSION = 2
 
 _ROLLOUT_KEY = "trial INTEGER, episode INTEGER, idx INTEGER"
-_REWARD_COLUMNS = ("reward", "reward_distance", "reward_angle", "reward_legs")
-_EPISODE_COLUMNS = (
-    "n_scored",
-    "mu_rrev_c_per_s",
-    "mu_moment_y_Nmm",
-    "sigma_rrev_c_per_s",
-    "sigma_moment_y_Nmm",
-    "recommended_rrev_c_per_s",
-    "recommended_moment_y_Nmm",
-    "reward_mean",
-    "rate_four_leg",
-    "rate_clean",
-    "stopped",
-)
-
-
-@dataclass(frozen=True)
-class RolloutRows:
-    """Rollouts of one or more trials as read back, in the order (trial, episode, idx).
-
-    Attributes:
-        trial: Trial of each rollout, shape (n,).
-        episode: Episode within the trial, shape (n,).
-        idx: Place within the episode, shape (n,).
-        stream: Random stream, shape (n,).
-        status: "planned", "scored" or "discarded", shape (n,).
-        theta: Policies, shape (n, 2).
-        reward: Return, shape (n,), NaN if not scored.
-        outcomes: Outcome records, shape (n,); NaN and zero if not flown.
-    """
-
-    trial: npt.NDArray[np.int64]
-    episode: npt.NDArray[np.int64]
-    idx: npt.NDArray[np.int64]
-    stream: npt.NDArray[np.uint64]
-    status: npt.NDArray[np.str_]
-    theta: npt.NDArray[np.float64]
-    reward: npt.NDArray[np.float64]
-    outcomes: Outcomes
-
-    def __len__(self) -> int:
-        """Number of rollouts."""
-        return len(self.trial)
-
-
-@dataclass(frozen=True)
-class EpisodeRow:
-    """What is kept of one finished episode of one trial; arrays have one element per policy parameter."""
-
-    trial: int
-    episode: int
-    n_scored: int
-    mu: tuple[float, ...]
-    sigma: tuple[float, ...]
-    recommended: tuple[float, ...]
-    reward_mean: float
-    rate_four_leg: float
-    rate_clean: float
-    stopped: bool
+_SEARCH = ("mu", "sigma", "recommended")
+_EPISODE_FIGURES = {"reward_mean": "REAL", "rate_four_leg": "REAL", "rate_clean": "REAL", "stopped": "INTEGER"}
 
 
 class RunStore:
-    """One run folder, open for writing by this process alone."""
+    """One run folder, open for writing by this process alone: the recorder of a run that may be killed.
+
+    Attributes:
+        folder: The run folder.
+        layout: What its columns of policies and rewards are.
+    """
+
+    layout: Layout
 
     def __init__(self, folder: Path, outcome_dtype: np.dtype[np.void], lock: int) -> None:
         """Use `create` or `open_existing`; `lock` is the descriptor that keeps the folder."""
@@ -113,7 +65,12 @@ class RunStore:
 
     @classmethod
     def create(
-        cls, folder: Path, config_yaml: str, manifest: Mapping[str, Any], outcome_dtype: np.dtype[np.void]
+        cls,
+        folder: Path,
+        config_yaml: str,
+        manifest: Mapping[str, Any],
+        outcome_dtype: np.dtype[np.void],
+        layout: Layout,
     ) -> "RunStore":
         """Make a new run folder.
 
@@ -131,6 +88,7 @@ class RunStore:
                 os.close(lock)
                 raise
             store = cls(folder, outcome_dtype, lock)
+            store.layout = layout
             with store._transaction():
                 store._create_tables()
             write_durably(folder / "config.yaml", config_yaml.encode())
@@ -146,15 +104,13 @@ class RunStore:
         Raises:
             StoreError: There is no run, it is of another schema version, or another process has it open.
         """
-        manifest = read_manifest(folder)
-        if manifest.get("schema_version") != SCHEMA_VERSION:
-            version = manifest.get("schema_version")
-            raise StoreError(f"{folder}: schema version {version!r}, this program reads {SCHEMA_VERSION}")
+        check_version(folder, read_manifest(folder), SCHEMA_VERSION)
         store = cls(folder, outcome_dtype, lock_folder(folder))
         known = [row[1] for row in store._db.execute("PRAGMA table_info(rollout)")]
         if not known or [c for c in known if c.startswith("out_")] != list(store._outcome_columns):
             store.close()
             raise StoreError(f"{folder}: run.sqlite has other columns than the outcomes of this version")
+        store.layout = store._read_layout()
         return store
 
     def close(self) -> None:
@@ -171,53 +127,50 @@ class RunStore:
         self.close()
 
     def plan(
-        self, episode: int, trials: Sequence[int], stream: npt.NDArray[np.uint64], theta:
-        Sequence[npt.NDArray[np.float64]],
-        states: Sequence[Mapping[str, Any]],
-    ) -> None:  # fmt: skip
-        """Commit the policies of one episode, before any is flown, with the learners' states after `ask`.
-
-        Args:
-            episode: Number of the episode.
-            trials: Trials that take part.
-            stream: Random stream of each rollout, shape (n_rollouts,), the same in every trial.
-            theta: For each trial the policies, shape (n_rollouts, 2).
-            states: For each trial the learner's state.
-        """
+        self,
+        episode: int,
+        trials: Sequence[int],
+        stream: npt.NDArray[np.uint64],
+        theta: Sequence[npt.NDArray[np.float64]],
+        states: Iterable[Mapping[str, Any]],
+    ) -> None:
+        """Commit the policies of one episode, before any is flown, with the learners' states after `ask`."""
         rows = [
-            (trial, episode, idx, int(stream[idx]), PLANNED, float(policy[0]), float(policy[1]))
+            (trial, episode, idx, int(stream[idx]), PLANNED, *policy)
             for trial, policies in zip(trials, theta, strict=True)
-            for idx, policy in enumerate(policies)
+            for idx, policy in enumerate(policies.tolist())
         ]
-        insert = (
-            "INSERT INTO rollout(trial, episode, idx, stream, status, rrev_c_per_s, moment_y_Nmm) VALUES(?,?,?,?,?,?,?)"
-        )
+        names = ("trial", "episode", "idx", "stream", "status", *self.layout.policy_columns())
         with self._transaction():
-            self._db.executemany(insert, rows)
+            self._db.executemany(f"INSERT INTO rollout({', '.join(names)}) VALUES({_marks(names)})", rows)
             self._save_states(trials, states)
 
     def score(
-        self, keys: Sequence[tuple[int, int, int]], outcomes: Outcomes, reward: Reward, discarded: str = ""
+        self,
+        episode: int,
+        trial: npt.NDArray[np.int64],
+        idx: npt.NDArray[np.int64],
+        outcomes: Outcomes,
+        terms: Terms,
+        discarded: str = "",
     ) -> None:
         """Commit the outcomes of some planned rollouts.
 
-        Args:
-            keys: (trial, episode, idx) of each.
-            outcomes: Outcome records, shape (n,).
-            reward: Terms, each of shape (n,).
-            discarded: Reason why they must not count; empty if they do.
+        Raises:
+            StoreError: One of them was not planned, or is scored already; then none is committed.
         """
-        names = ("status", "discarded", *_REWARD_COLUMNS, *self._outcome_columns)
+        rewards = self._reward_columns()
+        names = ("status", "discarded", *rewards.values(), *self._outcome_columns)
         update = (
             f"UPDATE rollout SET {', '.join(f'{name}=?' for name in names)} "
             f"WHERE trial=? AND episode=? AND idx=? AND status='{PLANNED}'"
         )
         status = DISCARDED if discarded else SCORED
-        columns = [term.tolist() for term in (reward.total, reward.distance, reward.angle, reward.legs)]
+        columns = [terms[name].tolist() for name in rewards]
         columns += self._flatten(outcomes)
         rows = [
-            (status, discarded, *map(_to_sql, values), *key)
-            for values, key in zip(zip(*columns, strict=True), keys, strict=True)
+            (status, discarded, *map(_to_sql, values), of_trial, episode, place)
+            for values, of_trial, place in zip(zip(*columns, strict=True), trial.tolist(), idx.tolist(), strict=True)
         ]
         with self._transaction():
             changed = self._db.executemany(update, rows).rowcount
@@ -226,16 +179,17 @@ class RunStore:
                     f"{self.folder}: {len(rows) - changed} of {len(rows)} scored rollouts were not planned"
                 )
 
-    def finish_episode(self, rows: Sequence[EpisodeRow], states: Sequence[Mapping[str, Any]]) -> None:
+    def finish_episode(self, rows: Sequence[EpisodeRow], states: Iterable[Mapping[str, Any]]) -> None:
         """Commit one episode of some trials: its figures and the learners' states after `tell`, in one transaction."""
-        marks = ",".join("?" * (2 + len(_EPISODE_COLUMNS)))
         values = [
             (r.trial, r.episode, r.n_scored, *r.mu, *r.sigma, *r.recommended,
              *map(_to_sql, (r.reward_mean, r.rate_four_leg, r.rate_clean)), int(r.stopped))
             for r in rows
         ]  # fmt: skip
         with self._transaction():
-            self._db.executemany(f"INSERT INTO episode VALUES({marks})", values)
+            self._db.executemany(
+                f"INSERT INTO episode VALUES({_marks(('trial', 'episode', *self._figures()))})", values
+            )
             self._save_states([r.trial for r in rows], states)
 
     def learner_states(self) -> dict[int, dict[str, Any]]:
@@ -244,50 +198,78 @@ class RunStore:
 
     def episodes(self) -> list[EpisodeRow]:
         """All finished episodes, ordered by (trial, episode)."""
-        query = f"SELECT trial, episode, {', '.join(_EPISODE_COLUMNS)} FROM episode ORDER BY trial, episode"
-        return [_episode_row(row) for row in self._db.execute(query)]
+        query = f"SELECT trial, episode, {', '.join(self._figures())} FROM episode ORDER BY trial, episode"
+        return [_episode_row(row, len(self.layout.policy)) for row in self._db.execute(query)]
 
     def rollouts(self, trial: int | None = None, episode: int | None = None) -> RolloutRows:
         """Rollouts of one trial or all, of one episode or all."""
-        names = ("trial", "episode", "idx", "stream", "status", "rrev_c_per_s", "moment_y_Nmm", "reward")
-        query = f"SELECT {', '.join((*names, *self._outcome_columns))} FROM rollout"
+        names = ["trial", "episode", "idx", "stream", "status", *self.layout.policy_columns()]
+        names += [*self._reward_columns().values(), *self._outcome_columns]
+        query = f"SELECT {', '.join(names)} FROM rollout"
         wanted = {"trial": trial, "episode": episode}
         given = {name: value for name, value in wanted.items() if value is not None}
         if given:
             query += " WHERE " + " AND ".join(f"{name}=?" for name in given)
         rows = self._db.execute(query + " ORDER BY trial, episode, idx", tuple(given.values())).fetchall()
-        return self._rollout_rows(rows, len(names))
+        columns = zip(*rows, strict=True) if rows else ((),) * len(names)
+        return self._rollout_rows(dict(zip(names, columns, strict=True)), len(rows))
 
-    def _rollout_rows(self, rows: list[tuple[Any, ...]], n_names: int) -> RolloutRows:
-        column = list(zip(*rows, strict=True)) or [()] * (n_names + len(self._outcome_columns))
+    def _rollout_rows(self, column: Mapping[str, Sequence[Any]], n: int) -> RolloutRows:
+        rewards = {
+            name: np.array([_from_sql(x) for x in column[sql]], dtype=np.float64)
+            for name, sql in self._reward_columns().items()
+        }
+        policies = [column[name] for name in self.layout.policy_columns()]
         return RolloutRows(
-            trial=np.array(column[0], dtype=np.int64),
-            episode=np.array(column[1], dtype=np.int64),
-            idx=np.array(column[2], dtype=np.int64),
-            stream=np.array(column[3], dtype=np.uint64),
-            status=np.array(column[4], dtype=np.str_),
-            theta=np.array([column[5], column[6]], dtype=np.float64).T.copy(),
-            reward=np.array([_from_sql(x) for x in column[7]], dtype=np.float64),
-            outcomes=self._unflatten(column[n_names:], len(rows)),
+            trial=np.array(column["trial"], dtype=np.int64),
+            episode=np.array(column["episode"], dtype=np.int64),
+            idx=np.array(column["idx"], dtype=np.int64),
+            stream=np.array(column["stream"], dtype=np.uint64),
+            status=np.array(column["status"], dtype=np.str_),
+            theta=np.array(policies, dtype=np.float64).reshape(len(policies), n).T.copy(),
+            reward=rewards.pop(TOTAL),
+            outcomes=self._unflatten([column[name] for name in self._outcome_columns], n),
+            terms=rewards,
         )
+
+    def _reward_columns(self) -> dict[str, str]:
+        """Column of the return and of each of its terms, by the name in `Terms`."""
+        return {TOTAL: "reward", **self.layout.term_columns()}
+
+    def _figures(self) -> dict[str, str]:
+        """Columns of an episode beside its key, with their types."""
+        search = [column for prefix in _SEARCH for column in self.layout.policy_columns(prefix)]
+        return {"n_scored": "INTEGER", **dict.fromkeys(search, "REAL"), **_EPISODE_FIGURES}
 
     def _create_tables(self) -> None:
         outcome = ", ".join(f"{name} {kind}" for name, kind in self._outcome_columns.items())
-        rewards = ", ".join(f"{name} REAL" for name in _REWARD_COLUMNS)
-        figures = ", ".join(
-            f"{name} {'INTEGER' if name in ('n_scored', 'stopped') else 'REAL'}" for name in _EPISODE_COLUMNS
-        )
+        policy = ", ".join(f"{name} REAL NOT NULL" for name in self.layout.policy_columns())
+        rewards = ", ".join(f"{name} REAL" for name in self._reward_columns().values())
+        figures = ", ".join(f"{name} {kind}" for name, kind in self._figures().items())
         self._db.execute(
             f"CREATE TABLE rollout({_ROLLOUT_KEY}, stream INTEGER NOT NULL, status TEXT NOT NULL, discarded TEXT, "
-            f"rrev_c_per_s REAL NOT NULL, moment_y_Nmm REAL NOT NULL, {rewards}, {outcome}, "
-            "PRIMARY KEY(trial, episode, idx)) WITHOUT ROWID"
+            f"{policy}, {rewards}, {outcome}, PRIMARY KEY(trial, episode, idx)) WITHOUT ROWID"
         )
         self._db.execute(
             f"CREATE TABLE episode(trial INTEGER, episode INTEGER, {figures}, PRIMARY KEY(trial, episode))"
         )
         self._db.execute("CREATE TABLE learner(trial INTEGER PRIMARY KEY, state TEXT NOT NULL)")
+        self._db.execute("CREATE TABLE quantity(role TEXT, place INTEGER, name TEXT, unit TEXT, doc TEXT)")
+        rows = [
+            (role, place, quantity.name, quantity.unit, quantity.doc)
+            for role, quantities in self.layout.by_role()
+            for place, quantity in enumerate(quantities)
+        ]
+        self._db.executemany("INSERT INTO quantity VALUES(?,?,?,?,?)", rows)
 
-    def _save_states(self, trials: Sequence[int], states: Sequence[Mapping[str, Any]]) -> None:
+    def _read_layout(self) -> Layout:
+        query = "SELECT name, unit, doc FROM quantity WHERE role=? ORDER BY place"
+        policy, terms = (
+            tuple(Quantity(*row) for row in self._db.execute(query, (role,))) for role in ("policy", "terms")
+        )
+        return Layout(policy, terms)
+
+    def _save_states(self, trials: Sequence[int], states: Iterable[Mapping[str, Any]]) -> None:
         rows = [(trial, json.dumps(state, allow_nan=False)) for trial, state in zip(trials, states, strict=True)]
         self._db.executemany("INSERT OR REPLACE INTO learner(trial, state) VALUES(?,?)", rows)
 
@@ -341,6 +323,26 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     return manifest
 
 
+def check_version(folder: Path | str, manifest: Mapping[str, Any], schema_version: int) -> None:
+    """Refuse a folder whose files another version of this program wrote in another form.
+
+    Args:
+        folder: Run folder of `ivl learn`, `ivl sweep` or `ivl map`.
+        manifest: Its manifest.
+        schema_version: Version of the form that this program reads and writes in folders of that kind.
+
+    Raises:
+        StoreError: The folder's form is another one.
+    """
+    found = manifest.get("schema_version")
+    if found != schema_version:
+        writer = manifest.get("ivl_version", "of unknown version")
+        raise StoreError(
+            f"{folder}: written by ivl {writer} with schema version {found}; "
+            f"this is ivl {ivl.__version__}, which reads schema version {schema_version} alone"
+        )
+
+
 def write_json(path: Path, data: Any) -> None:
     """Write JSON so that the file is there whole or not at all."""
     write_durably(path, (json.dumps(data, indent=2, allow_nan=False) + "\n").encode())
@@ -366,20 +368,18 @@ def _from_sql(value: Any) -> Any:
     return np.nan if value is None else value
 
 
-def _episode_row(row: tuple[Any, ...]) -> EpisodeRow:
+def _marks(columns: Collection[str]) -> str:
+    """Place-holders for the values of so many columns."""
+    return ",".join("?" * len(columns))
+
+
+def _episode_row(row: tuple[Any, ...], dim: int) -> EpisodeRow:
     trial, episode, n_scored, *rest = row
-    reward_mean, rate_four_leg, rate_clean = (_from_sql(value) for value in rest[6:9])
+    mu, sigma, recommended = (tuple(rest[first : first + dim]) for first in range(0, 3 * dim, dim))
+    *figures, stopped = rest[3 * dim :]
+    reward_mean, rate_four_leg, rate_clean = map(_from_sql, figures)
     return EpisodeRow(
-        trial=trial,
-        episode=episode,
-        n_scored=n_scored,
-        mu=(rest[0], rest[1]),
-        sigma=(rest[2], rest[3]),
-        recommended=(rest[4], rest[5]),
-        reward_mean=reward_mean,
-        rate_four_leg=rate_four_leg,
-        rate_clean=rate_clean,
-        stopped=bool(rest[9]),
+        trial, episode, n_scored, mu, sigma, recommended, reward_mean, rate_four_leg, rate_clean, bool(stopped)
     )
 
 

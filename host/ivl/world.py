@@ -351,7 +351,8 @@ class World:
         """Parameters in SI units with zeros behind them, shape (..., 64)."""
         if len(theta) != form.n:
             raise ArgumentError(
-                f"a policy of the form {form.name} has {form.n} parameters ({', '.join(form.names)}), {len(theta)} are given"
+                f"a policy of the form {form.name} has {form.n} parameters ({', '.join(form.names)}), "
+                f"{len(theta)} are given"
             )
         columns = [_numbers(name, value) for name, value in zip(form.names, theta, strict=True)]
         try:

@@ -81,7 +81,8 @@ def paths(model: type[BaseModel]) -> dict[str, bool]:
         for kind in kinds:
             if isinstance(kind, type) and issubclass(kind, BaseModel):
                 found |= {f"{name}.{path}": free for path, free in paths(kind).items()}
-    return found
+    further = getattr(model, "further_paths", None)  # of a model whose other fields follow from what it holds
+    return found | further() if further else found
 
 
 def _kinds(annotation: Any) -> Iterable[Any]:

@@ -7,8 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from ivl.layout import layout_of
 from ivl.sweep import config, folder, plan, schema, store, work
 
+LAYOUT = layout_of(config.load_sweep("sweeps/paper.yaml"))
 Rate = Callable[[pd.DataFrame], np.ndarray]
 """Landing rates from a table with the columns v (m/s), phi (deg) and k (trial)."""
 
@@ -25,7 +27,7 @@ def make_trials(
     v, phi, trial = (a.ravel() for a in np.meshgrid(speeds, angles, range(n_trials), indexing="ij"))
     vx, vz = v * np.cos(np.deg2rad(phi)), v * np.sin(np.deg2rad(phi))
     d, landed = vz / rrev, np.asarray(rate(pd.DataFrame({"v": v, "phi": phi, "k": trial})), dtype=np.float64)
-    frame = pd.DataFrame({f.name: np.zeros(len(v)) for f in schema.schema(schema.TRIALS)})
+    frame = pd.DataFrame({f.name: np.zeros(len(v)) for f in schema.schema(schema.TRIALS, LAYOUT)})
     names = {"vehicle": "habas2021", "gear_set": "table1", "gear": "wide_short", "learner": "bo", **names}
     values = {
         **names,

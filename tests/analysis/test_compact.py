@@ -8,8 +8,10 @@ import pytest
 
 from ivl.analysis import compact
 from ivl.analysis.claims import evaluate
-from ivl.sweep import schema
+from ivl.layout import layout_of
+from ivl.sweep import config, schema
 
+LAYOUT = layout_of(config.load_sweep("sweeps/paper.yaml"))
 Trials = Callable[..., pd.DataFrame]
 
 
@@ -34,7 +36,7 @@ def random_trials(trials: Trials) -> pd.DataFrame:
     return frame
 
 
-NO_EPISODES = pd.DataFrame({f.name: [] for f in schema.schema(schema.EPISODES)})
+NO_EPISODES = pd.DataFrame({f.name: [] for f in schema.schema(schema.EPISODES, LAYOUT)})
 
 
 def test_a_round_trip_keeps_counts_exactly_and_values_to_half_a_step(trials: Trials) -> None:

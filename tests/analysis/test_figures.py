@@ -10,10 +10,12 @@ from matplotlib.text import Text
 
 from ivl.cli import run
 from ivl.errors import ConfigError, StoreError
+from ivl.layout import layout_of
 from ivl.plots import campaign, fig04_convergence, fig09_gears, paper, style
 from ivl.plots.campaign import Campaign
 from ivl.sweep import config, schema
 
+LAYOUT = layout_of(config.load_sweep("sweeps/paper.yaml"))
 Trials = Callable[..., pd.DataFrame]
 SPEEDS, ANGLES = (1.0, 2.0, 2.5, 3.0, 4.0), (20.0, 45.0, 70.0, 90.0)
 
@@ -23,7 +25,7 @@ def make_episodes(trials: pd.DataFrame, n: int = 6) -> pd.DataFrame:
     rows = trials.loc[trials.index.repeat(n), list(schema.TRIAL_KEY)].reset_index(drop=True)
     episode = np.tile(np.arange(n), len(trials))
     share = episode / (n - 1)
-    frame = pd.DataFrame({f.name: np.zeros(len(rows)) for f in schema.schema(schema.EPISODES)})
+    frame = pd.DataFrame({f.name: np.zeros(len(rows)) for f in schema.schema(schema.EPISODES, LAYOUT)})
     return frame.assign(**{c: rows[c] for c in rows}).assign(
         episode=episode,
         n_scored=8,

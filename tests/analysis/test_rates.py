@@ -11,6 +11,7 @@ from ivl.analysis.rates import (
     cell_rates,
     compare,
     mean_rate,
+    of_solved_cells,
     profile,
     rollouts_to_rate,
     single_trial_failures,
@@ -86,6 +87,7 @@ def test_a_failed_trial_counts_only_where_another_solved_the_cell(trials: Trials
     assert (result.n_failed, result.share.n, result.n_trials) == (1, 10, 15)
     assert result.share.value == pytest.approx(0.1)
     assert (result.share.low, result.share.high) == pytest.approx(wilson(0.1, 10))
+    assert sorted(of_solved_cells(trials((2.0,), rate=rate))["angle_deg"].unique()) == [30.0, 90.0]
 
 
 def test_another_gear_that_solved_the_condition_does_not_count(trials: Trials) -> None:

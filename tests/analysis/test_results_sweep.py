@@ -12,8 +12,10 @@ import pandas as pd
 import pytest
 
 from ivl.analysis import campaign_text, compact, moment, separability
+from ivl.layout import layout_of
 from ivl.sweep import config, schema
 
+LAYOUT = layout_of(config.load_sweep("sweeps/paper.yaml"))
 Trials = Callable[..., pd.DataFrame]
 Fly = Callable[[config.Sweep | config.PolicyMap, Path], Path]
 ROOT = Path(__file__).parents[2]
@@ -71,7 +73,7 @@ def test_the_text_says_what_the_campaign_holds(campaign: pd.DataFrame) -> None:
 
 
 def write_data(campaign: pd.DataFrame, path: Path) -> None:
-    no_episodes = pd.DataFrame({f.name: [] for f in schema.schema(schema.EPISODES)})
+    no_episodes = pd.DataFrame({f.name: [] for f in schema.schema(schema.EPISODES, LAYOUT)})
     path.mkdir()
     compact.write(compact.pack(campaign[campaign["vehicle"] == "habas2021"], no_episodes), path / "trials.parquet")
 

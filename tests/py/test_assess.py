@@ -5,9 +5,11 @@ import ivl
 from ivl import assess, native
 from ivl.assess import Best, Verdict
 from ivl.experiment import Experiment, GridAxis
-from ivl.learn import LearningRun
+from ivl.layout import layout_of
+from ivl.learning.loop import LearningRun, trials_of
+from ivl.learning.recorder import EpisodeRow, RolloutRows
 from ivl.source import WorldSource
-from ivl.store import SCHEMA_VERSION, EpisodeRow, RolloutRows, RunStore
+from ivl.store import SCHEMA_VERSION, RunStore
 
 GOOD, BAD = (4.8, 8.0), (2.0, 3.0)
 BEST = Best(GOOD, 1.0, 1.0, 0)
@@ -100,7 +102,7 @@ def test_the_best_policy_beats_every_point_of_its_grid(small: Experiment) -> Non
     )
     world = ivl.World("habas2021", "wide_short", "as_simulated", **{"sense.velocity_noise": 0.05})
     best = assess.find_best(world, chosen)
-    theta = assess._grid(chosen.check.rrev_c_per_s, chosen.check.moment_y_Nmm)
+    theta = assess._grid(assess._axes(chosen))
     out = world.rollouts(2.5, 90.0, theta[:, :1], theta[:, 1:], stream=np.arange(300), seed=99)
     rates = ivl.four_leg(out).mean(axis=1)
     assert best.rate_four_leg > rates.max() - 0.07
@@ -110,7 +112,7 @@ def test_the_best_policy_beats_every_point_of_its_grid(small: Experiment) -> Non
     ("lo", "hi", "step", "n", "last"), [(0.5, 10.0, 0.05, 191, 10.0), (1.0, 2.0, 0.3, 4, 1.9), (0.0, 0.3, 0.1, 4, 0.3)]
 )
 def test_a_grid_axis_covers_its_range(lo: float, hi: float, step: float, n: int, last: float) -> None:
-    grid = assess._grid(GridAxis(lo=lo, hi=hi, step=step), GridAxis(lo=0.0, hi=1.0, step=1.0))
+    grid = assess._grid([GridAxis(lo=lo, hi=hi, step=step), GridAxis(lo=0.0, hi=1.0, step=1.0)])
     values = np.unique(grid[:, 0])
     assert len(values) == n
     assert values[-1] == pytest.approx(last)
@@ -136,8 +138,9 @@ def test_summary_begins_with_the_keys_that_scripts_rely_on() -> None:
 
 def test_a_real_run_is_judged_from_its_store(small: Experiment, world: ivl.World, tmp_path: object) -> None:
     dtype = native.library().outcome_dtype
-    with RunStore.create(tmp_path / "run", "", {"schema_version": SCHEMA_VERSION}, dtype) as store:  # type: ignore[operator]
-        LearningRun(small, WorldSource(world, small), store, 2).run()
+    manifest = {"schema_version": SCHEMA_VERSION}
+    with RunStore.create(tmp_path / "run", "", manifest, dtype, layout_of(small)) as store:  # type: ignore[operator]
+        LearningRun(trials_of(small, 2), WorldSource(world, small), store).run()
         verdicts = assess.judge(world, small, BEST, store.episodes(), store.rollouts())
         failed = (store.rollouts(trial=1).outcomes["n_legs"] < 3).sum()
     assert verdicts[1].failed_landings_total == failed

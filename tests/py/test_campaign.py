@@ -4,7 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ivl import campaign, native
+import ivl
+from ivl import campaign, cli, experiment, native, store
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.store import RunStore
@@ -106,6 +107,26 @@ def test_a_run_whose_world_changed_is_not_resumed(small: Experiment, tmp_path: P
     path.write_text(json.dumps({**json.loads(path.read_text()), key: "other"}))
     with pytest.raises(StoreError, match=message):
         campaign.run(small, tmp_path / "run", resume=True)
+
+
+@pytest.mark.parametrize("command", [["learn", "--resume", "--out"], ["report"], ["export"]])
+def test_a_run_of_an_older_version_is_refused_in_one_line_that_names_both(
+    small: Experiment, small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    run = tmp_path / "run"
+    campaign.run(small, run)
+    path = run / "manifest.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "schema_version": 1, "ivl_version": "0.0.9"}))
+    (run / "config.yaml").write_text("form: of old\n")
+    before = {file: file.read_bytes() for file in run.iterdir()}
+    assert cli.run([*command, str(run)]) != 0
+    line = f"{run}: written by ivl 0.0.9 with schema version 1; this is ivl {ivl.__version__}, which reads schema"
+    complaint = capsys.readouterr().err
+    assert f"{line} version {store.SCHEMA_VERSION} alone" in complaint
+    assert len(complaint.splitlines()) == 1
+    assert {file: file.read_bytes() for file in run.iterdir()} == before
+    with pytest.raises(StoreError, match=r"written by ivl 0\.0\.9"):
+        campaign.run(experiment.load(str(small_file)), run, resume=True)
 
 
 def test_a_run_flown_elsewhere_is_not_continued_in_the_simulator(small: Experiment, tmp_path: Path) -> None:

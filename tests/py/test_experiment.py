@@ -7,6 +7,7 @@ import pytest
 from ivl import experiment
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
+from ivl.rewards import RewardChoice
 
 Data = dict[str, Any]
 
@@ -79,7 +80,7 @@ def test_the_resolved_text_reads_back_as_the_same_experiment(small: Experiment, 
         ("learner.options", {"k": 3}, "options of RobustEPHE: k: unknown key"),
         ("reward", {"name": "money"}, "no reward 'money'"),
         ("reward", {"options": {"d_floor_m": 0.0}}, "reward.options.d_floor_m: value 0.0"),
-        ("check.rrev_c_per_s", {"lo": 2.0, "hi": 1.0, "step": 0.1}, "lo 2.0 must be below hi 1.0"),
+        ("check.grid.rrev_c_per_s", {"lo": 2.0, "hi": 1.0, "step": 0.1}, "lo 2.0 must be below hi 1.0"),
         ("overrides", {"sense.latncy": {"value": 0.1, "unit": "s", "source": "x"}}, "did you mean 'sense.latency'"),
         (
             "overrides",
@@ -108,11 +109,16 @@ def test_a_faulty_experiment_is_refused_in_one_line(small_data: Data, path: str,
         ("sense.latency=0.02", lambda e: e.overrides["sense.latency"].value == 0.02),
         ("sense.latency=0.02", lambda e: e.overrides["sense.latency"].unit == "s"),
         ("gear_set=table1", lambda e: e.gear_set == "table1"),
-        ("reward.name=authors_code", lambda e: e.reward.name == "authors_code"),
+        ("reward.name=authors_code", lambda e: e.reward == RewardChoice(name="authors_code")),
     ],
 )
 def test_a_setting_changes_one_field(small_file: Path, setting: str, read: Callable[[Experiment], bool]) -> None:
     assert read(experiment.load(str(small_file), [setting]))
+
+
+def test_a_reward_s_options_stay_as_long_as_its_name_does(small_file: Path) -> None:
+    settings = ["reward.options.d_floor_m=0.06", "reward.name=paper"]
+    assert experiment.load(str(small_file), settings).reward == RewardChoice(options={"d_floor_m": 0.06})
 
 
 @pytest.mark.parametrize(

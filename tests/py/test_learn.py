@@ -7,19 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ivl import native
+from ivl import experiment, native
 from ivl.errors import RolloutError
 from ivl.experiment import Experiment
-from ivl.learn import LearningRun, Progress, recent_rate
+from ivl.layout import layout_of
+from ivl.learning.loop import LearningRun, Progress, recent_rate, trials_of
+from ivl.learning.recorder import EpisodeRow
 from ivl.source import Flown, Plan, WorldSource
-from ivl.store import SCHEMA_VERSION, EpisodeRow, RunStore
+from ivl.store import SCHEMA_VERSION, RunStore
 
 DTYPE = native.library().outcome_dtype
+LAYOUT = layout_of(experiment.load("experiments/paper_vertical.yaml"))
 N_TRIALS = 3
 
 
 def create(folder: Path) -> RunStore:
-    return RunStore.create(folder, "", {"schema_version": SCHEMA_VERSION}, DTYPE)
+    return RunStore.create(folder, "", {"schema_version": SCHEMA_VERSION}, DTYPE, LAYOUT)
 
 
 def reopen(folder: Path) -> RunStore:
@@ -34,7 +37,7 @@ def contents(folder: Path) -> list[list[tuple[object, ...]]]:
 
 
 def learn(experiment: Experiment, store: RunStore, n_trials: int = N_TRIALS) -> None:
-    LearningRun(experiment, WorldSource(experiment.make_world(), experiment), store, n_trials).run()
+    LearningRun(trials_of(experiment, n_trials), WorldSource(experiment.make_world(), experiment), store).run()
 
 
 @pytest.fixture
@@ -90,7 +93,7 @@ class Discarding(Portions):
 def test_a_run_flies_its_budget_and_reports_every_episode(small: Experiment, tmp_path: Path) -> None:
     seen: list[Progress] = []
     with create(tmp_path / "run") as store:
-        LearningRun(small, WorldSource(small.make_world(), small), store, 2).run(seen.append)
+        LearningRun(trials_of(small, 2), WorldSource(small.make_world(), small), store).run(seen.append)
         rollouts = store.rollouts()
     assert [p.episode for p in seen] == [1, 2, 3, 4]
     assert [len(p.rows) for p in seen] == [2] * 4
@@ -128,7 +131,7 @@ def test_the_order_in_which_results_come_does_not_matter(
     small: Experiment, tmp_path: Path, whole: list[list[tuple[object, ...]]]
 ) -> None:
     with create(tmp_path / "run") as store:
-        LearningRun(small, Portions(WorldSource(small.make_world(), small)), store, N_TRIALS).run()
+        LearningRun(trials_of(small, N_TRIALS), Portions(WorldSource(small.make_world(), small)), store).run()
     assert contents(tmp_path / "run") == whole
 
 
@@ -138,7 +141,7 @@ def test_a_run_continues_after_its_source_broke_down(
 ) -> None:
     world_source = WorldSource(small.make_world(), small)
     with create(tmp_path / "run") as store:
-        run = LearningRun(small, Failing(world_source, portions), store, N_TRIALS)
+        run = LearningRun(trials_of(small, N_TRIALS), Failing(world_source, portions), store)
         with pytest.raises(RolloutError, match="link lost"):
             run.run()
     with reopen(tmp_path / "run") as store:
@@ -214,7 +217,7 @@ def test_every_kind_of_learner_continues_in_mid_episode(small: Experiment, tmp_p
         learn(chosen, store, 1)
     source = Failing(WorldSource(chosen.make_world(), chosen), portions=5)
     with create(tmp_path / "run") as store, pytest.raises(RolloutError):
-        LearningRun(chosen, source, store).run()
+        LearningRun([chosen], source, store).run()
     with reopen(tmp_path / "run") as store:
         learn(chosen, store, 1)
     assert contents(tmp_path / "run") == contents(tmp_path / "whole")
@@ -223,7 +226,7 @@ def test_every_kind_of_learner_continues_in_mid_episode(small: Experiment, tmp_p
 def test_discarded_rollouts_do_not_count(small: Experiment, tmp_path: Path) -> None:
     source = Discarding(WorldSource(small.make_world(), small), {1})
     with create(tmp_path / "run") as store:
-        LearningRun(small, source, store).run()
+        LearningRun([small], source, store).run()
         rollouts, episodes = store.rollouts(), store.episodes()
     assert (rollouts.status == "discarded").sum() == 4
     assert [row.n_scored for row in episodes] == [3] * 4
@@ -232,7 +235,7 @@ def test_discarded_rollouts_do_not_count(small: Experiment, tmp_path: Path) -> N
 def test_an_episode_of_which_everything_was_discarded_changes_nothing(small: Experiment, tmp_path: Path) -> None:
     source = Discarding(WorldSource(small.make_world(), small), {0, 1, 2, 3})
     with create(tmp_path / "run") as store:
-        LearningRun(small, source, store).run()
+        LearningRun([small], source, store).run()
         episodes = store.episodes()
     assert {row.mu for row in episodes} == {(4.8, 8.0)}
     assert np.isnan(recent_rate(episodes))

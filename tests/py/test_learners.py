@@ -168,6 +168,47 @@ def test_equal_returns_are_survived(name: str, reward: float) -> None:
         assert np.isfinite(array).all()
 
 
+def searched(name: str, seed: int, factor: float, told: bool) -> np.ndarray:
+    """All that a learner asks in ten episodes on a shelf beside a ridge, its returns multiplied by a factor.
+
+    The returns have steps and ties, as those of landings have, and a part that varies smoothly.
+    """
+    learner, asked = new(name, seed), []
+    for _ in range(10):
+        theta = learner.ask()
+        asked.append(theta)
+        off = theta[:, 0] - 4.6
+        landed = (np.abs(off) < 0.15) & (theta[:, 1] > 5.0)
+        steps = np.where(landed, 165.0, np.where(np.abs(off) < 0.8, 60.0, np.where(off > 0, 20.0, 3.0)))
+        returns = steps + np.where(landed, np.cos(3 * off), 0.0) + np.where(off < -1.5, theta[:, 1], 0.0)
+        learner.tell(theta, factor * returns, {"landed": landed} if told else None)
+    return np.array(asked)
+
+
+@pytest.mark.parametrize("told", [True, False], ids=["landings told", "returns alone"])
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", NAMES)
+def test_a_factor_on_all_returns_changes_no_ask(name: str, seed: int, told: bool) -> None:
+    plain = searched(name, seed, 1.0, told)
+    for factor in (2.0**-20, 0.5, 2.0**20):  # exact in binary: not a bit may change
+        assert (searched(name, seed, factor, told) == plain).all(), factor
+    for factor in (1e-3, 1e3):  # each return is rounded once more
+        assert searched(name, seed, factor, told) == pytest.approx(plain, rel=1e-9, abs=1e-9), factor
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("reward", [175.0, 0.1, 1e-3 / 3])
+def test_what_equal_returns_amount_to_does_not_change_the_asks(name: str, reward: float) -> None:
+    asked = []
+    for value in (1.0, reward):
+        learner = new(name)
+        for _ in range(4):
+            theta = learner.ask(7)
+            learner.tell(theta, np.full(7, value))
+        asked.append(learner.ask())
+    assert asked[0] == pytest.approx(asked[1], rel=1e-9)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_the_easy_ridge_is_learned(name: str, fly: Fly) -> None:
     wins = 0

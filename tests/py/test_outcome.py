@@ -52,3 +52,11 @@ def test_as_dict_is_json_with_null_for_what_did_not_happen(world: ivl.World) -> 
     assert len(data["leg_order"]) == 4
     assert data["end_reason"] == "contact_time"
     assert set(data) == set(record.dtype.names)
+
+
+def test_solved_and_stuck_are_shares_of_what_is_possible() -> None:
+    rates = np.array([0.0, 0.36, 0.37, 0.59, 0.61, 0.75, np.nan])
+    assert outcome.solved(rates, possible=0.75).tolist() == [False, False, False, False, True, True, False]
+    assert outcome.stuck(rates, possible=0.75).tolist() == [True, True, True, False, False, False, False]
+    assert outcome.solved(rates, possible=0.75, share=0.9).tolist() == [False] * 5 + [True, False]
+    assert (bool(outcome.solved(0.8)), bool(outcome.solved(0.79)), bool(outcome.stuck(0.5))) == (True, False, False)

@@ -12,11 +12,16 @@ import pytest
 
 from ivl import native, store
 from ivl.errors import StoreError
-from ivl.reward import RewardOptions, paper
-from ivl.store import EpisodeRow, RunStore
+from ivl.layout import Layout
+from ivl.learning.recorder import EpisodeRow
+from ivl.quantity import Quantity
+from ivl.rewards import RewardChoice
+from ivl.store import RunStore
 
 DTYPE = native.library().outcome_dtype
 MANIFEST = {"schema_version": store.SCHEMA_VERSION, "seed": 0}
+PAPER = RewardChoice(name="paper")
+LAYOUT = Layout((Quantity("gap_m", "m", "first"), Quantity("push_N", "N", "second")), PAPER.reward.terms)
 THETA = np.array([[4.0, 5.0], [4.1, 5.1], [0.1 + 0.2, 1e-17]])
 
 
@@ -34,7 +39,7 @@ def outcomes(n: int) -> np.ndarray:
 
 @pytest.fixture
 def run(tmp_path: Path) -> Iterator[RunStore]:
-    with RunStore.create(tmp_path / "run", "a: 1\n", MANIFEST, DTYPE) as opened:
+    with RunStore.create(tmp_path / "run", "a: 1\n", MANIFEST, DTYPE, LAYOUT) as opened:
         yield opened
 
 
@@ -45,7 +50,9 @@ def plan(run: RunStore, episode: int = 0, trials: tuple[int, ...] = (0, 1)) -> N
 
 def score(run: RunStore, keys: list[tuple[int, int, int]], discarded: str = "") -> None:
     records = outcomes(len(keys))
-    run.score(keys, records, paper(records, RewardOptions()), discarded)
+    trial, episode, idx = np.array(keys).T
+    assert len(set(episode.tolist())) == 1
+    run.score(int(episode[0]), trial, idx, records, PAPER.score(records), discarded)
 
 
 def row(trial: int, episode: int) -> EpisodeRow:
@@ -81,7 +88,33 @@ def test_outcomes_come_back_bit_for_bit(run: RunStore) -> None:
     rows = run.rollouts(trial=0)
     assert rows.status.tolist() == ["scored", "planned", "scored"]
     assert rows.outcomes[[0, 2]].tobytes() == outcomes(2).tobytes()
-    assert rows.reward[0] == paper(outcomes(1), RewardOptions()).total[0]
+    paid = PAPER.score(outcomes(1))
+    assert rows.reward[0] == paid.pop("total")[0]
+    assert {name: values[0] for name, values in rows.terms.items()} == {name: value[0] for name, value in paid.items()}
+    assert all(np.isnan(values[1]) for values in rows.terms.values())
+
+
+def test_columns_are_named_after_the_policy_and_the_reward(run: RunStore) -> None:
+    rollout, episode = (
+        [column[1] for column in run._db.execute(f"PRAGMA table_info({table})")] for table in ("rollout", "episode")
+    )
+    assert rollout[6:12] == ["gap_m", "push_N", "reward", "reward_distance", "reward_angle", "reward_legs"]
+    assert episode[3:9] == [f"{prefix}_{name}" for prefix in ("mu", "sigma", "recommended") for name in rollout[6:8]]
+
+
+@pytest.mark.parametrize("dim", [1, 3])
+def test_a_policy_has_any_number_of_parameters(tmp_path: Path, dim: int) -> None:
+    layout = Layout(tuple(Quantity(f"p{i}", "1", "") for i in range(dim)), PAPER.reward.terms)
+    theta = np.arange(2.0 * dim).reshape(2, dim)
+    known = EpisodeRow(0, 0, 2, (1.0,) * dim, (2.0,) * dim, (3.0,) * dim, 1.0, 0.5, 0.0, False)
+    with RunStore.create(tmp_path / "run", "", MANIFEST, DTYPE, layout) as run:
+        run.plan(0, [0], np.arange(2, dtype=np.uint64), [theta], [{}])
+        run.finish_episode([known], [{}])
+    with RunStore.open_existing(tmp_path / "run", DTYPE) as run:
+        assert run.layout == layout
+        assert (run.rollouts().theta == theta).all()
+        assert run.episodes() == [known]
+        assert run.rollouts(episode=1).theta.shape == (0, dim)
 
 
 def test_a_discarded_rollout_keeps_its_reason(run: RunStore) -> None:
@@ -96,7 +129,7 @@ def test_scoring_what_was_not_planned_or_is_scored_already_is_refused_as_a_whole
     plan(run)
     score(run, [(0, 0, 0)])
     with pytest.raises(StoreError, match="were not planned"):
-        score(run, [(0, 0, 1), key])
+        score(run, [(0, key[1], 1), key])
     assert run.rollouts(trial=0).status.tolist() == ["scored", "planned", "planned"]
 
 
@@ -132,7 +165,7 @@ def test_learner_states_keep_big_integers(run: RunStore) -> None:
 
 
 def test_a_run_is_found_again_after_closing(tmp_path: Path) -> None:
-    with RunStore.create(tmp_path / "run", "a: 1\n", MANIFEST, DTYPE) as run:
+    with RunStore.create(tmp_path / "run", "a: 1\n", MANIFEST, DTYPE, LAYOUT) as run:
         plan(run)
     with RunStore.open_existing(tmp_path / "run", DTYPE) as run:
         assert len(run.rollouts()) == 6
@@ -141,21 +174,21 @@ def test_a_run_is_found_again_after_closing(tmp_path: Path) -> None:
 def test_a_folder_with_a_run_is_not_overwritten(run: RunStore) -> None:
     run.close()
     with pytest.raises(StoreError, match="holds a run already: continue it with --resume"):
-        RunStore.create(run.folder, "", MANIFEST, DTYPE)
+        RunStore.create(run.folder, "", MANIFEST, DTYPE, LAYOUT)
     run._lock = os.open(os.devnull, os.O_RDONLY)  # for the fixture to close
 
 
 def test_a_folder_with_something_else_is_not_touched(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(StoreError, match=r"is not empty \(thesis\.tex"):
-        RunStore.create(tmp_path, "", MANIFEST, DTYPE)
+        RunStore.create(tmp_path, "", MANIFEST, DTYPE, LAYOUT)
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
 
 def test_a_creation_that_was_cut_off_is_started_over(tmp_path: Path) -> None:
     (tmp_path / "run.sqlite").write_bytes(b"half a file")
     (tmp_path / "config.yaml.part").write_text("a")
-    with RunStore.create(tmp_path, "a: 1\n", MANIFEST, DTYPE) as run:
+    with RunStore.create(tmp_path, "a: 1\n", MANIFEST, DTYPE, LAYOUT) as run:
         assert len(run.rollouts()) == 0
 
 
@@ -180,7 +213,7 @@ def test_a_run_is_locked_against_other_processes_until_its_process_ends(run: Run
         (None, "holds no run"),
         ("{", "cannot be read"),
         ("[]", "expected an object"),
-        ('{"schema_version": 99}', "schema version 99, this program reads"),
+        ('{"schema_version": 99}', "ivl of unknown version with schema version 99; this is ivl"),
     ],
 )
 def test_a_folder_that_cannot_be_continued_is_refused(tmp_path: Path, text: str | None, message: str) -> None:
@@ -199,7 +232,7 @@ def test_a_run_with_other_outcome_columns_is_refused(run: RunStore) -> None:
 
 
 def test_a_damaged_database_is_refused(tmp_path: Path) -> None:
-    RunStore.create(tmp_path, "", MANIFEST, DTYPE).close()
+    RunStore.create(tmp_path, "", MANIFEST, DTYPE, LAYOUT).close()
     for name in ("run.sqlite-wal", "run.sqlite-shm"):
         (tmp_path / name).unlink(missing_ok=True)
     (tmp_path / "run.sqlite").write_bytes(b"not a database, but long enough to look at" * 100)
@@ -210,4 +243,4 @@ def test_a_damaged_database_is_refused(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match="file/run: cannot be written"):
-        RunStore.create(tmp_path / "file" / "run", "", MANIFEST, DTYPE)
+        RunStore.create(tmp_path / "file" / "run", "", MANIFEST, DTYPE, LAYOUT)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import ivl
 from ivl.landing import LandingSpec
 from ivl.report import replay
+from ivl.rewards import RewardChoice
 
 KINDS: dict[str, dict[str, Any]] = {
     "four feet": {"speed_mps": 2.5, "angle_deg": 60.0, "rrev_c_per_s": 4.8, "moment_y_Nmm": 8.0},
@@ -37,7 +38,7 @@ class Decoded:
 def landing(request: pytest.FixtureRequest) -> tuple[Any, Decoded, ivl.World]:
     spec = LandingSpec(gear_set="as_simulated", **KINDS[request.param])
     world, trace = spec.fly()
-    decoded = Decoded(replay.pack(spec, world, trace))
+    decoded = Decoded(replay.pack(spec, world, trace, RewardChoice()))
     rows = trace.rows[(trace.rows.t_s >= decoded.t_s[0]) & (trace.rows.t_s <= decoded.t_s[-1])]
     return rows, decoded, world
 
@@ -81,7 +82,7 @@ def test_phases_and_cues_are_those_of_the_trace(landing: tuple[Any, Decoded, ivl
 
 def test_rows_are_dense_around_the_flip_and_few_in_all(spec: LandingSpec) -> None:
     world, trace = spec.fly()
-    decoded = Decoded(replay.pack(spec, world, trace))
+    decoded = Decoded(replay.pack(spec, world, trace, RewardChoice()))
     trigger_s, impact_s = float(trace.outcome.t_trigger_s), float(trace.outcome.t_impact_s)
     flip = ((decoded.t_s >= trigger_s) & (decoded.t_s <= impact_s + 0.1)).sum() / (impact_s + 0.1 - trigger_s)
     approach = (decoded.t_s < trigger_s).sum() / (trigger_s - decoded.t_s[0])
@@ -94,7 +95,7 @@ def test_turning_feet_that_are_sliding_or_let_go_are_told() -> None:
         gear_set="as_simulated", overrides={"leg.adhesion": 0.3, "leg.stick_delay": 0.004}, **KINDS["four feet"]
     )
     world, trace = spec.fly()
-    packed = replay.pack(spec, world, trace)
+    packed = replay.pack(spec, world, trace, RewardChoice())
     states = {event[2] for event in packed["feet"]}
     assert {0, 1} <= states
 

@@ -12,7 +12,8 @@ import ivl
 from ivl import campaign, experiment
 from ivl.cli import run as cli
 from ivl.errors import ConfigError, RolloutError
-from ivl.learn import LearningRun
+from ivl.layout import layout_of
+from ivl.learning.loop import LearningRun
 from ivl.links import open_source, pil
 from ivl.native import library
 from ivl.source import Plan, WorldSource
@@ -79,8 +80,8 @@ def test_learning_in_the_loop_ends_with_the_same_policy_bit_for_bit(tmp_path: Pa
 
 def _learn(chosen, source, folder):
     manifest = campaign.make_manifest(chosen, chosen.make_world(), None)
-    with RunStore.create(folder, chosen.to_yaml(), manifest, library().outcome_dtype) as store:
-        LearningRun(chosen, source, store).run()
+    with RunStore.create(folder, chosen.to_yaml(), manifest, library().outcome_dtype, layout_of(chosen)) as store:
+        LearningRun([chosen], source, store).run()
         return store.episodes(), store.rollouts()
 
 

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from small_sweep import MAP, fly, make, write
 
 import ivl
+from ivl import report
 from ivl.errors import StoreError
+from ivl.layout import layout_of
 from ivl.sweep import config, folder, schema, store
 from ivl.sweep.config import PolicyMap, Sweep
 
@@ -19,27 +22,28 @@ def small_map(tmp_path: Path) -> PolicyMap:
 
 
 @pytest.mark.parametrize("kind", schema.KINDS)
-def test_every_column_has_a_unit_and_a_meaning_and_its_name_says_the_unit(kind: str) -> None:
+def test_every_column_has_a_unit_and_a_meaning_and_its_name_says_the_unit(kind: str, small: Sweep) -> None:
+    layout = layout_of(small)
     suffix = {"m": "_m", "s": "_s", "deg": "_deg", "m/s": "_mps", "rad/s": "_radps", "1/s": "_per_s", "N mm": "_Nmm"}
     suffix["bytes"] = "_bytes"
-    for field in schema.schema(kind):
+    for field in schema.schema(kind, layout):
         unit = field.metadata[b"unit"].decode()
         assert field.metadata[b"doc"]
         assert not field.nullable
         if unit != "1":
             assert field.name.endswith(suffix[unit]), (field.name, unit)
-    assert schema.units(kind).keys() == set(schema.schema(kind).names)
+    assert schema.units(kind, layout).keys() == set(schema.schema(kind, layout).names)
 
 
-def test_tables_come_back_as_they_were_written(reference: Path) -> None:
+def test_tables_come_back_as_they_were_written(reference: Path, small: Sweep) -> None:
     for kind in ("trials", "episodes", "rollouts", "tasks"):
         table = store.read_table(reference, kind)
-        assert table.schema.equals(schema.schema(kind), check_metadata=True)
+        assert table.schema.equals(schema.schema(kind, layout_of(small)), check_metadata=True)
         assert table.num_rows > 0
         assert all(column.null_count == 0 for column in table.columns)
         parts = [pq.read_table(path) for path in (reference / kind).glob("*.parquet")]
         assert table.num_rows == sum(part.num_rows for part in parts)
-        assert all(part.schema.metadata[schema.VERSION_KEY] == b"1" for part in parts)
+        assert all(part.schema.metadata[schema.VERSION_KEY] == b"2" for part in parts)
 
 
 def test_pandas_keeps_seeds_names_and_units(reference: Path) -> None:
@@ -105,7 +109,7 @@ def test_parts_of_another_version_or_shape_and_torn_ones_are_refused(small: Swee
     with pytest.raises(StoreError, match=r"000000\.parquet: cannot be read"):
         store.read_trials(run)
     pq.write_table(table.replace_schema_metadata({schema.VERSION_KEY: b"0"}), path)
-    with pytest.raises(StoreError, match="schema version 0, this program reads 1"):
+    with pytest.raises(StoreError, match="schema version 0, this program reads 2"):
         store.read_trials(run)
     pq.write_table(table.append_column("extra", pa.array([0] * table.num_rows)), path)
     with pytest.raises(StoreError, match="other columns than this version's: extra"):
@@ -115,12 +119,41 @@ def test_parts_of_another_version_or_shape_and_torn_ones_are_refused(small: Swee
 def test_what_is_no_run_is_said_to_be_none(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="holds no sweep"):
         store.read_manifest(tmp_path)
-    (tmp_path / "manifest.json").write_text('{"schema_version": 1}')
+    (tmp_path / "manifest.json").write_text('{"schema_version": 2}')
     with pytest.raises(StoreError, match="is not the manifest of a sweep"):
         store.read_manifest(tmp_path)
+    with pytest.raises(StoreError, match="is not the manifest of a sweep"):
+        store.read_trials(tmp_path)
+
+
+def test_a_table_that_does_not_exist_is_refused_and_one_without_parts_is_empty(small: Sweep, tmp_path: Path) -> None:
+    worlds = {gear: small.make_world(gear) for gear in small.gear_names()}
+    folder.open_run(tmp_path / "run", small, worlds, 100, resume=False).close()
     with pytest.raises(StoreError, match="no table 'people'"):
-        store.read_table(tmp_path, "people")
-    assert store.read_trials(tmp_path).empty
+        store.read_table(tmp_path / "run", "people")
+    assert store.read_trials(tmp_path / "run").empty
+
+
+def test_a_sweep_of_an_older_version_is_refused_in_one_line_that_names_both(
+    small: Sweep, small_map: PolicyMap, tmp_path: Path
+) -> None:
+    for grid in (small, small_map):
+        run = tmp_path / grid.name
+        worlds = {gear: grid.make_world(gear) for gear in grid.gear_names()}
+        folder.open_run(run, grid, worlds, 100, resume=False).close()
+        manifest = json.loads((run / "manifest.json").read_text())
+        del manifest["layout"]  # as in version 1
+        (run / "manifest.json").write_text(json.dumps({**manifest, "schema_version": 1, "ivl_version": "0.0.9"}))
+        line = f"{run}: written by ivl 0.0.9 with schema version 1; this is ivl {ivl.__version__}, which reads schema"
+        for use in (
+            lambda run=run: store.read_trials(run),
+            lambda run=run, grid=grid, worlds=worlds: folder.open_run(run, grid, worlds, 100, resume=True),
+        ):
+            with pytest.raises(StoreError) as caught:
+                use()
+            assert str(caught.value) == f"{line} version {schema.SCHEMA_VERSION} alone"
+    with pytest.raises(StoreError, match=r"written by ivl 0\.0\.9 with schema version 1"):
+        report.write(tmp_path / "small")
 
 
 def test_the_manifest_says_what_was_run(reference: Path, small: Sweep) -> None:

@@ -9,12 +9,13 @@ import pytest
 from small_sweep import fly, make, same_tables
 
 import ivl
-from ivl import native
-from ivl.learn import LearningRun
+from ivl import native, source
+from ivl.layout import layout_of
 from ivl.learners import LEARNERS, Entry, RobustEPHE
+from ivl.learning.loop import LearningRun
 from ivl.outcome import clean, four_leg
 from ivl.source import WorldSource
-from ivl.store import RunStore
+from ivl.store import SCHEMA_VERSION, RunStore
 from ivl.sweep import store, trials, work
 from ivl.sweep.config import Sweep
 from ivl.sweep.plan import Task
@@ -41,10 +42,9 @@ def test_a_trial_is_what_ivl_learn_does_with_its_seed(learner: str, tmp_path: Pa
     log = trials.run(sweep, world, [Trial(2.5, 60.0, 0), Trial(3.5, 90.0, 1)])
     chosen = sweep.experiment("wide_long", 3.5, 90.0, 1)
     assert chosen.seed == log.run_seed[1]
-    with RunStore.create(
-        tmp_path / "run", chosen.to_yaml(), {"schema_version": 1}, native.library().outcome_dtype
-    ) as run:
-        LearningRun(chosen, WorldSource(world, chosen, 1), run).run()
+    dtype, manifest = native.library().outcome_dtype, {"schema_version": SCHEMA_VERSION}
+    with RunStore.create(tmp_path / "run", chosen.to_yaml(), manifest, dtype, layout_of(chosen)) as run:
+        LearningRun([chosen], WorldSource(world, chosen, 1), run).run()
         rollouts, episodes = run.rollouts(), run.episodes()
     assert (log.theta[1].reshape(-1, 2) == rollouts.theta).all()
     assert (log.reward[1].ravel() == rollouts.reward).all()
@@ -183,7 +183,7 @@ def test_a_worker_with_another_library_refuses_before_it_unpacks_the_world(small
 def test_rollouts_that_the_simulation_gave_up_are_not_learned_from(
     monkeypatch: pytest.MonkeyPatch, small: Sweep, world: ivl.World
 ) -> None:
-    monkeypatch.setattr(trials, "valid", lambda outcomes: np.arange(outcomes.shape[-1]) > np.zeros(outcomes.shape))
+    monkeypatch.setattr(source, "valid", lambda outcomes: np.arange(outcomes.size) % 6 > 0)
     log = trials.run(small, world, [Trial(2.5, 60.0, 0)])
     table = work.tables.trials_table(small, "wide_long", log).to_pandas().iloc[0]
     assert table["n_discarded"] == 5

@@ -16,8 +16,9 @@ from ivl.analysis.contact import contact_order
 from ivl.analysis.intervals import Estimate, difference
 from ivl.analysis.moment import explained
 from ivl.analysis.policy import MOMENT, THRESHOLD, recommended
-from ivl.analysis.rates import RATE, SOLVED_RATE, cell_rates, compare, mean_rate, profile
+from ivl.analysis.rates import RATE, cell_rates, compare, mean_rate, profile
 from ivl.analysis.separability import auc_gain, separability
+from ivl.outcome import SOLVED_SHARE, solved
 
 YES, PARTLY, NO, NOT_MEASURED = "yes", "partly", "no", "not measured"
 PAPER_GEAR = "wide_short"
@@ -108,7 +109,7 @@ def _convergence(trials: pd.DataFrame) -> Found:
     verdict = YES if lands and soon and near else PARTLY if lands else NO
     when = f"after {needed:.0f} rollouts (median)" if np.isfinite(needed) else "at no time in the median trial"
     finding = (
-        f"{len(own)} trials: landing rate {show(rate)}; it reaches {SOLVED_RATE} for good {when}; "
+        f"{len(own)} trials: landing rate {show(rate)}; it reaches {SOLVED_SHARE} for good {when}; "
         f"policy RREV_c {rrev:.2f} 1/s, M_yd {moment:.2f} N mm (medians)."
     )
     return verdict, finding, {
@@ -259,10 +260,10 @@ def _favoured_angles(trials: pd.DataFrame) -> Found:
 
 def _fore_legs_first(trials: pd.DataFrame) -> Found:
     """Yes: in solved trials of all gears a fore leg first in 95 % and a hind leg after it in 90 %; partly: in most."""
-    solved = trials[(trials[RATE] >= SOLVED_RATE) & (trials["n_attached"] > 0)]
-    if solved.empty:
+    good_trials = trials[solved(trials[RATE]) & (trials["n_attached"] > 0)]
+    if good_trials.empty:
         return _unmeasured("solved trial")
-    order = {gear: contact_order(_gear(solved, gear)) for gear in _gears(solved)}
+    order = {gear: contact_order(_gear(good_trials, gear)) for gear in _gears(good_trials)}
     good = [o.fore_first.value >= 0.95 and o.swing_completed.value >= 0.9 for o in order.values()]
     most = [min(o.fore_first.low, o.swing_completed.low) > 0.5 for o in order.values()]
     verdict = YES if all(good) else PARTLY if all(most) else NO

@@ -12,15 +12,13 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
 from ivl.analysis.intervals import Estimate, difference, share_of, stratified_mean, wilson
+from ivl.outcome import RECENT_EPISODES, SOLVED_SHARE, solved, stuck
 from ivl.sweep.schema import cell_columns
 
 RATE, CLEAN_RATE = "landing_rate_four_leg_norm", "landing_rate_clean_norm"
 CHECK_RATE, CHECK_CLEAN_RATE = "check_rate_four_leg_norm", "check_rate_clean_norm"
 COUNT = {RATE: "n_recent", CLEAN_RATE: "n_recent", CHECK_RATE: "n_check", CHECK_CLEAN_RATE: "n_check"}
 """Column with the number of rollouts behind each rate."""
-
-SOLVED_RATE, STUCK_RATE = 0.8, 0.5
-"""A trial has solved its cell from the first rate on, and is stuck below the second."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ def cell_rates(trials: pd.DataFrame, rate: str = RATE) -> pd.DataFrame:
     table["best_low_norm"], table["best_high_norm"] = wilson(
         table["rate_best_norm"], best[COUNT[rate]].reindex(table.index)
     )
-    table["n_solved"] = (known[rate] >= SOLVED_RATE).groupby([known[k] for k in keys], observed=True).sum()
+    table["n_solved"] = solved(known[rate]).groupby([known[k] for k in keys], observed=True).sum()
     return table.reset_index()
 
 
@@ -115,15 +113,18 @@ def compare(
 
 
 def single_trial_failures(trials: pd.DataFrame, rate: str = RATE) -> TrialFailures:
-    """Share of trials that end below `STUCK_RATE` where another trial of the same cell reached `SOLVED_RATE`."""
+    """Share of trials that end stuck where another trial of the same cell solved it."""
+    failed = stuck(of_solved_cells(trials, rate)[rate])
+    return TrialFailures(share_of(failed), int(failed.sum()), int(trials[rate].notna().sum()))
+
+
+def of_solved_cells(trials: pd.DataFrame, rate: str = RATE) -> pd.DataFrame:
+    """The trials with a rate whose cell some trial solved, itself perhaps: among these, one can be stuck."""
     known = trials[trials[rate].notna()]
-    best = known.groupby(cell_columns(known), observed=True)[rate].transform("max")
-    solvable = known.loc[best >= SOLVED_RATE, rate]
-    failed = solvable < STUCK_RATE
-    return TrialFailures(share_of(failed), int(failed.sum()), len(known))
+    return known[solved(known.groupby(cell_columns(known), observed=True)[rate].transform("max"))]
 
 
-def rollouts_to_rate(episodes: pd.DataFrame, rate: float = SOLVED_RATE, window: int = 3) -> pd.DataFrame:
+def rollouts_to_rate(episodes: pd.DataFrame, rate: float = SOLVED_SHARE, window: int = RECENT_EPISODES) -> pd.DataFrame:
     """Rollouts of each trial until its landing rate over `window` episodes reaches `rate` and stays there.
 
     Args:

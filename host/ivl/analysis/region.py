@@ -12,8 +12,10 @@ import numpy.typing as npt
 import pandas as pd  # type: ignore[import-untyped]
 from scipy import ndimage  # type: ignore[import-untyped]
 
+from ivl import outcome
 from ivl.analysis.policy import MOMENT, recommended
-from ivl.analysis.rates import RATE, SOLVED_RATE
+from ivl.analysis.rates import RATE
+from ivl.outcome import SOLVED_SHARE
 from ivl.sweep.schema import TRIAL_KEY
 
 STATE = ("vx_mps", "vz_mps", "d_ceil_m")
@@ -43,7 +45,7 @@ class Components:
     n_points: int
 
 
-def trial_points(trials: pd.DataFrame, rate: str = RATE, solved: float = SOLVED_RATE) -> pd.DataFrame:
+def trial_points(trials: pd.DataFrame, rate: str = RATE, solved: float = SOLVED_SHARE) -> pd.DataFrame:
     """One point per trial that triggered: the mean state and cues in which its last three episodes flipped.
 
     Returns:
@@ -54,15 +56,13 @@ def trial_points(trials: pd.DataFrame, rate: str = RATE, solved: float = SOLVED_
     points = points.assign(
         moment_Nmm=points[recommended(MOMENT)],
         rate_norm=points[rate],
-        success=points[rate] >= solved,
+        success=outcome.solved(points[rate], share=solved),
         condition=points.groupby(["speed_mps", "angle_deg"], observed=True).ngroup(),
     )
-    return points[[*TRIAL_KEY, *STATE, *FLOW, "moment_Nmm", "rate_norm", "success", "condition"]].reset_index(
-        drop=True
-    )
+    return points[[*TRIAL_KEY, *STATE, *FLOW, "moment_Nmm", "rate_norm", "success", "condition"]].reset_index(drop=True)
 
 
-def map_states(points: pd.DataFrame, solved: float = SOLVED_RATE) -> pd.DataFrame:
+def map_states(points: pd.DataFrame, solved: float = SOLVED_SHARE) -> pd.DataFrame:
     """States of a policy map, the moments gathered: which of them land.
 
     Args:
@@ -80,7 +80,7 @@ def map_states(points: pd.DataFrame, solved: float = SOLVED_RATE) -> pd.DataFram
     states = first[["vx_mps", "vz_mps", *FLOW]].first().reset_index()
     rate = ordered["n_four_leg"] / ordered["n"].clip(lower=1)
     runs = [
-        _longest_run(part["moment_Nmm"].to_numpy(), part["rate"].to_numpy() >= solved)
+        _longest_run(part["moment_Nmm"].to_numpy(), outcome.solved(part["rate"].to_numpy(), share=solved))
         for _, part in ordered.assign(rate=rate).groupby(keys, observed=True, sort=True)
     ]
     columns = ["n_moments", "n_landing", "moment_low_Nmm", "moment_high_Nmm"]

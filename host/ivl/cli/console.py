@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 
 from ivl.forms import Form
-from ivl.learn import Progress
+from ivl.learning.loop import Progress
 
 out = Console()
 err = Console(stderr=True)

@@ -7,11 +7,11 @@ import numpy as np
 import typer
 
 from ivl import experiment, outcome
-from ivl.cli import console
+from ivl.cli import console, policy_options
 from ivl.errors import LinkError
 from ivl.links.options import Options
 from ivl.mocap import config as mocap_config
-from ivl.reward import RewardOptions, paper
+from ivl.rewards import TOTAL, RewardChoice
 
 HELP = """Fly one landing with a vehicle, and print what it latched at the trigger and how it ended.
 
@@ -31,8 +31,9 @@ Examples:
 
 def fly(
     uri: Annotated[str, typer.Option(help="Link of the vehicle: radio://, usb://, udp://, tcp:// or serial://.")],
-    rrev: Annotated[float, typer.Option("--rrev", "--rrev-c", help="Trigger threshold RREV_c, 1/s.")],
-    moment: Annotated[float, typer.Option(help="Flip moment M_yd, N mm (magnitude, nose up).")],
+    rrev: policy_options.Rrev = None,
+    moment: policy_options.Moment = None,
+    theta: policy_options.Theta = None,
     path: Annotated[
         str, typer.Argument(metavar="[EXPERIMENT]", help="YAML file of the experiment.")
     ] = "experiments/paper_vertical.yaml",
@@ -50,6 +51,7 @@ def fly(
 ) -> None:
     """Fly one landing; HELP is the text that people see."""
     chosen = experiment.load(path, settings or [])
+    policy = policy_options.theta_of(chosen.policy.form, theta, rrev, moment)
     try:
         from ivl.links import crazyflie
         from ivl.links.episode import Rollout
@@ -61,7 +63,7 @@ def fly(
         mocap=tracker, rehearse=rehearse, other_world=True, keep_recordings=csv is not None, say=console.say
     )
     with crazyflie.CrazyflieSource(uri, chosen, options) as source:
-        landing = source.fly_one(Rollout(rrev, moment, seed, stream))
+        landing = source.fly_one(Rollout(tuple(policy), seed, stream))
         end_reason = source.world.end_reason(int(landing.outcome["end_reason"][0]))
     if csv is not None and landing.recording is not None:
         csv.write_text(landing.recording.to_csv(), encoding="utf-8")
@@ -90,5 +92,5 @@ def _outcome(record: Any, end_reason: str) -> dict[str, Any]:
     result = outcome.as_dict(record[0], end_reason)
     result["four_leg"] = bool(outcome.four_leg(record)[0])
     result["clean"] = bool(outcome.clean(record)[0])
-    result["reward_paper"] = float(paper(record, RewardOptions()).total[0])
+    result["reward_paper"] = float(RewardChoice(name="paper").score(record)[TOTAL][0])
     return result

@@ -1,6 +1,7 @@
 """`ivl learn`."""
 
 import shlex
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -72,7 +73,7 @@ def learn(
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], out, resume)
     folder = out or campaign.default_folder(chosen, n_trials, resume)
-    hooks = campaign.Hooks(_announce, console.print_episode, _stage)
+    hooks = campaign.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage)
     flight = Options(
         mocap=mocap_config.load(mocap) if mocap else None,
         other_world=other_world,
@@ -126,7 +127,7 @@ def _announce(folder: Path) -> None:
 
 
 def _stage(stage: int, n_stages: int) -> None:
-    console.err.print(f"judging: best possible policy, stage {stage + 1} of {n_stages} of the grid", highlight=False)
+    console.err.print(f"judging: best possible policy, stage {stage + 1} of {n_stages}", highlight=False)
 
 
 def _draw(result: campaign.RunResult) -> list[Path]:
@@ -138,11 +139,12 @@ def _draw(result: campaign.RunResult) -> list[Path]:
 
 def _report(result: campaign.RunResult, pictures: list[Path]) -> None:
     summary, best = result.summary, result.best
-    lines = _lines_of_trials(summary) if "trials" in summary else _lines_of_one(summary)
+    lines = _lines_of_trials(summary) if "trials" in summary else _lines_of_one(summary, result.experiment)
     best_text = (
-        f"{console.percent(best.rate_four_leg)} at RREV_c {best.theta[0]:.2f} 1/s, M_yd {best.theta[1]:.2f} N mm"
+        f"{console.percent(best.rate_four_leg)} at {result.experiment.policy.shape.describe(best.theta)} "
+        f"({best.search})"
     )
-    lines.append(("best possible policy (grid)", best_text))
+    lines.append(("best possible policy", best_text))
     if summary["discarded"]:
         lines.append(("discarded rollouts (not learned from)", str(summary["discarded"])))
     lines.extend(("note", text) for text in summary["warnings"])
@@ -152,13 +154,12 @@ def _report(result: campaign.RunResult, pictures: list[Path]) -> None:
         console.out.print(f"{name:36s} {text}", highlight=False, soft_wrap=True)
 
 
-def _lines_of_one(summary: dict[str, Any]) -> list[tuple[str, str]]:
-    mu, sigma = summary["mu"], summary["sigma"]
+def _lines_of_one(summary: dict[str, Any], experiment: Experiment) -> list[tuple[str, str]]:
+    found = zip(experiment.policy.shape.params, summary["mu"], summary["sigma"], strict=True)
     reached = summary["rollouts_to_convergence"]
     return [
         ("solved", f"yes, after {reached} rollouts" if summary["solved"] else "no"),
-        ("RREV_c", f"{mu[0]:.2f} ± {sigma[0]:.2f} 1/s"),
-        ("M_yd", f"{mu[1]:.2f} ± {sigma[1]:.2f} N mm"),
+        *((p.symbol, f"{mu:.2f} ± {sigma:.2f} {p.unit}") for p, mu, sigma in found),
         ("landing rate, last three episodes", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
         ("of the recommended policy", _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"])),
         ("failed landings until convergence", str(summary["failed_landings"])),

@@ -8,7 +8,7 @@ import typer
 from ivl import experiment, model
 from ivl.cli import console
 from ivl.learners import LEARNERS
-from ivl.reward import REWARDS
+from ivl.rewards import REWARDS, Reward
 
 HELP = """List what there is to choose from.
 
@@ -62,7 +62,13 @@ def _entries(kind: Kind) -> list[dict[str, Any]]:
         return [{"name": path, "doc": experiment.load(path).doc} for path in experiment.list_experiments()]
     if kind is Kind.LEARNERS:
         return [{"name": name, "doc": entry.doc, "options": _options(name)} for name, entry in LEARNERS.items()]
-    return [{"name": name, "doc": (function.__doc__ or "").splitlines()[0]} for name, function in REWARDS.items()]
+    return [_reward(reward) for reward in REWARDS.values()]
+
+
+def _reward(reward: Reward) -> dict[str, Any]:
+    options = {key: field.default for key, field in reward.options_type.model_fields.items()}
+    terms = {term.name: {"unit": term.unit, "doc": term.doc} for term in reward.terms}
+    return {"name": reward.name, "doc": reward.doc, "options": options, "terms": terms}
 
 
 def _gear(gear_set: str, name: str) -> dict[str, Any]:

@@ -6,12 +6,12 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from ivl import outcome, tracefile, yamlfile
-from ivl.cli import console
+from ivl import forms, outcome, tracefile, yamlfile
+from ivl.cli import console, policy_options
 from ivl.cli.task_options import EQUIPMENT, FLAGS, Chosen, task_options
 from ivl.errors import ConfigError
 from ivl.landing import LandingSpec
-from ivl.reward import RewardOptions, paper
+from ivl.rewards import TOTAL, RewardChoice
 from ivl.world import Trace, World
 
 HELP = """Fly one landing and print its outcome.
@@ -34,8 +34,10 @@ Examples:
 @task_options(*EQUIPMENT, "speed_mps", "angle_deg", "start")
 def rollout(
     chosen: Chosen,
-    rrev: Annotated[float, typer.Option(help="Trigger threshold RREV_c, 1/s.")],
-    moment: Annotated[float, typer.Option(help="Flip moment M_yd, N mm (magnitude, nose up).")],
+    rrev: policy_options.Rrev = None,
+    moment: policy_options.Moment = None,
+    form: policy_options.FormName = forms.PAPER,
+    theta: policy_options.Theta = None,
     distance: Annotated[float | None, typer.Option(help=f"{LandingSpec.model_fields['d_ceil_m'].description}")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.", min=0)] = 0,
     stream: Annotated[int, typer.Option(help="Number of the rollout within the seed.", min=0)] = 0,
@@ -48,7 +50,7 @@ def rollout(
         tracefile.check_suffix(trace)
     if plot and plot.suffix not in (".png", ".svg", ".pdf"):
         raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
-    policy = {"rrev_c_per_s": rrev, "moment_y_Nmm": moment}
+    policy = {"form": form, "theta": policy_options.theta_of(form, theta, rrev, moment)}
     numbers = {"seed": seed, "stream": stream, "d_ceil_m": distance}
     data = chosen.fields()
     for name in ("speed_mps", "angle_deg"):
@@ -79,7 +81,7 @@ def _result(world: World, flight: Trace) -> dict[str, Any]:
     batch = np.array([record], dtype=record.dtype)
     result["four_leg"] = bool(outcome.four_leg(batch)[0])
     result["clean"] = bool(outcome.clean(batch)[0])
-    result["reward_paper"] = float(paper(batch, RewardOptions()).total[0])
+    result["reward_paper"] = float(RewardChoice(name="paper").score(batch)[TOTAL][0])
     return result
 
 

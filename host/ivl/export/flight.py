@@ -10,6 +10,7 @@ import numpy.typing as npt
 from ivl import outcome, tracefile
 from ivl.errors import ConfigError
 from ivl.landing import LandingSpec
+from ivl.rewards import RewardChoice
 from ivl.world import World, rotation
 
 FloatArray = npt.NDArray[np.float64]
@@ -78,12 +79,15 @@ class Flight:
         return np.asarray(turned + self.vector("p_WB_m", 3)[:, None, :])
 
 
-def of_spec(spec: LandingSpec, title: str) -> Flight:
-    """Fly a landing."""
+def of_spec(spec: LandingSpec, title: str, reward: RewardChoice | None = None) -> Flight:
+    """Fly a landing; `reward` is what its run paid for landings, if it comes from one."""
     world, trace = spec.fly()
     result = outcome.as_dict(trace.outcome, world.end_reason(trace.outcome.end_reason))
     facts = {f"spec.{name}": str(value) for name, value in spec.model_dump(mode="json").items()}
     facts |= {f"outcome.{name}": str(value) for name, value in result.items()}
+    if reward:
+        terms = reward.score(np.array([trace.outcome], dtype=trace.outcome.dtype))
+        facts |= {f"reward.{name}": str(float(value[0])) for name, value in terms.items()}
     return _of_rows(trace.rows, world, title, facts)
 
 

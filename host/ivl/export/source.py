@@ -9,7 +9,9 @@ from ivl import campaign, landing, native
 from ivl.errors import ConfigError, StoreError
 from ivl.export.flight import Flight, of_file, of_spec
 from ivl.landing import LandingSpec
-from ivl.store import SCORED, RunStore, read_manifest
+from ivl.learning.recorder import SCORED
+from ivl.rewards import RewardChoice
+from ivl.store import RunStore, read_manifest
 from ivl.world import World
 
 
@@ -63,7 +65,7 @@ def resolve(source: Path, choice: Choice) -> Flight:
     return of_file(source, World(**shapes))
 
 
-def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str]:
+def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str, RewardChoice]:
     """A rollout of a run of `ivl learn`: the one that was asked for, or that with the largest return."""
     _allow(choice, ("trial", "rollout"), f"{folder} is a run of `ivl learn`")
     experiment, n_trials = campaign.read_config(folder)
@@ -80,10 +82,10 @@ def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str]:
         raise ConfigError(f"--rollout {row}: trial {trial} of {folder} has rollouts 0 .. {len(rollouts) - 1}")
     theta = (float(rollouts.theta[row, 0]), float(rollouts.theta[row, 1]))
     spec = landing.of_rollout(experiment, trial, theta, int(rollouts.stream[row]))
-    return spec, f"{experiment.name}, trial {trial}, rollout {row}"
+    return spec, f"{experiment.name}, trial {trial}, rollout {row}", experiment.reward
 
 
-def _of_sweep(folder: Path, choice: Choice) -> tuple[LandingSpec, str]:
+def _of_sweep(folder: Path, choice: Choice) -> tuple[LandingSpec, str, RewardChoice]:
     """The best landing of a trial of a sweep; of the trials that fit what was said, that with the largest return."""
     from ivl.report.sweep_page import best_landing, label  # pandas takes a second to load
     from ivl.sweep import store
@@ -103,7 +105,7 @@ def _of_sweep(folder: Path, choice: Choice) -> tuple[LandingSpec, str]:
         raise StoreError(f"{folder}: no trial of this choice has a landing")
     trial = flown.loc[flown["best_reward"].idxmax()]
     sweep = load_sweep(str(folder / "sweep.yaml"))
-    return best_landing(sweep, trial), label(trial, sweep)
+    return best_landing(sweep, trial), label(trial, sweep), sweep.at(sweep.variant_of(trial)).reward
 
 
 def _allow(choice: Choice, names: tuple[str, ...], why: str) -> None:

@@ -92,7 +92,7 @@ def _replay(flight: Flight, world: World, chips: Chips | None, battery: bool) ->
     if refused:
         most_Nmm = 1e3 * float(ticks.config["ivl.flip_moment_max"][0])
         raise ConfigError(
-            f"flight {flight.label}: {refused} refused by the flight core (policy {ticks.policy[1].tolist()} in SI units; "
-            f"moments up to {most_Nmm:g} N mm are allowed)"
+            f"flight {flight.label}: {refused} refused by the flight core (policy {ticks.policy[1].tolist()} "
+            f"in SI units; moments up to {most_Nmm:g} N mm are allowed)"
         )
     return Replayed(flight, ticks, rows)

@@ -44,8 +44,8 @@ LEARNERS: dict[str, Entry] = {
     ),
     "ephe_2021": Entry(
         EPHE,
-        "EPHE as in the landing paper's simulation code: best 2 of N, old mean, eps 0.001",
-        {"n_best": 2, "eps": 0.001},
+        "EPHE as in the landing paper's simulation code: best 2 of N, sigma about the old mean",
+        {"n_best": 2},
     ),
     "ephe_robust": Entry(RobustEPHE, "EPHE with above-mean weights and a limit on how fast sigma may shrink"),
     "cmaes": Entry(CMALearner, "CMA-ES of the cmaes package"),

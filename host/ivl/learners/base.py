@@ -8,6 +8,8 @@ The loop, as pycma and cmaes users know it (but returns are maximised):
         learner.tell(theta, rewards=fly(theta))
     print(learner.result.recommended)
 
+Only the order and the proportions of returns count: a factor on all of them changes nothing that a learner asks.
+
 The public methods check and copy; algorithms override the underscored ones and see only clean arrays.
 """
 
@@ -25,6 +27,8 @@ from ivl.yamlfile import explain
 
 FloatArray = npt.NDArray[np.float64]
 Meta = Mapping[str, npt.NDArray[Any]]
+LANDED = "landed"
+"""Name in `Meta` under which a learner is told which rollouts were landings (`ivl.outcome.four_leg`)."""
 
 
 class Options(BaseModel):
@@ -127,8 +131,8 @@ class Learner(ABC):
         Args:
             theta: Policies as flown, shape (n, dim).
             rewards: Return of each, shape (n,), >= 0, to be maximised.
-            meta: More about each rollout by name (fields of its outcome), each of shape (n, ...); learners may use or
-                ignore it.
+            meta: More about each rollout by name (fields of its outcome, and `LANDED`), each of shape (n, ...);
+                learners may use or ignore it.
 
         Raises:
             LearnerError: A shape is wrong, a value is not finite, or a return is negative.

@@ -6,9 +6,9 @@ the start's spread, z = (theta - mu0) / sigma0, with y the returns shifted and s
     first episode     theta ~ N(mu0, diag sigma0^2), truncated to the bounds                             (1)
     model             y = f(z) + noise, f a Gaussian process (see `ivl.learners.gp`), refitted after each episode:
                       its lengths and noise ratio are searched up to `settled` rollouts, then followed; they are
-                      searched again while a return has reached `aim` and the model expects that of no policy
+                      searched again while the model expects of no policy what a success is worth
     later episodes    theta_n = argmax over the candidates of f_n, f_n a draw of the posterior           (2)
-    before success    while fewer than `enough` returns reach `aim`, a share of an episode explores:
+    before success    while fewer than `enough` rollouts were successes, a share of an episode explores:
                       theta_i = argmax over the box of (calm + contrast(z)) distance(z)                  (4)
     after it          only a share of the draws of (2) is sought in the whole box, the others near what was best
     recommended       argmax(mean(z) - caution sd(z))                                                    (3)
@@ -21,7 +21,10 @@ noise explains that by ever shorter lengths, until it takes every lone landing f
 
 Returns alone lead to the nearest shelf: for many approaches flips that are far too early score better than misses, and
 a landing is a narrow ridge at the shelf's foot. What no return has shown, a model of the returns cannot expect; hence
-`aim`, below which the search does not settle. Exploring goes where the box is empty and where neighbouring policies
+the search does not settle before it has seen successes. What is one is told with the returns, as `landed`; where nobody
+tells, a success is a return in the upper half of the range of all that are remembered. Either way a factor on all
+returns changes nothing. A success is worth half the way from the mean return of the failures to that of the successes.
+Exploring goes where the box is empty and where neighbouring policies
 differ in their returns: the distance of (4) is that to the nearest policy flown, in widths of the box, and contrast is
 the range of the returns of the `n_nearest` policies, as a share of the range of all. (The idea, to weigh empty space
 with local variation, is that of LOLA-Voronoi designs: Crombecq et al., SIAM J. Sci. Comput. 33, 2011.) A landing lies
@@ -33,9 +36,10 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from ivl.learners.base import FloatArray, Learner, Meta, Options, draw_truncated
+from ivl.learners.base import LANDED, FloatArray, Learner, Meta, Options, draw_truncated
 from ivl.learners.gp import GaussianProcess, Hyper, fit
 
 _SEARCH_ROUNDS = 3
@@ -52,9 +56,8 @@ class BOOptions(Options):
     n_near: int = Field(default=300, ge=10, le=5000, description="candidates near what was best")
     n_elite: int = Field(default=20, ge=1, le=1000, description="policies that count as best")
     jitter: float = Field(default=0.5, gt=0, le=10, description="spread of the near candidates, in kernel lengths")
-    aim: float = Field(default=85.0, ge=0, description="return worth settling for: four feet, even with body contact")
     spread: float = Field(default=0.75, ge=0, le=1, description="share of an episode that explores before that")
-    enough: int = Field(default=4, ge=1, le=1000, description="returns that must reach the aim to end that exploration")
+    enough: int = Field(default=4, ge=1, le=1000, description="successes that end that exploration")
     roam: float = Field(default=0.25, ge=0, le=1, description="share of an episode that seeks the whole box after that")
     calm: float = Field(default=0.1, gt=0, le=10, description="weight of exploring where the returns around agree")
     n_nearest: int = Field(default=4, ge=2, le=100, description="neighbours whose returns are compared for that")
@@ -79,19 +82,20 @@ class BOLearner(Learner):
     def _setup(self) -> None:
         self._x = np.empty((0, self.dim))  # z of the module's text
         self._rewards = np.empty(0)
+        self._landed = np.empty(0)  # 1 or 0, NaN where nobody told
         self._box = self._scale(np.stack([self.lo, self.hi]))
         self._prior = Hyper(np.full(self.dim, self.options.length), self.options.noise)
         self._hyper = self._prior
         self._gp: GaussianProcess | None = None
         self._best = np.zeros(self.dim)
-        self._expected = -np.inf
+        self._expected = -np.inf  # largest return that the model expects of a flown policy
         self._spread = self.sigma0.copy()
 
     def _ask(self, n: int) -> FloatArray:
         if self._gp is None:
             return draw_truncated(self._rng, self.mu0, self.sigma0, self.lo, self.hi, n)  # (1)
         candidates = self._candidates(self._gp)
-        settles = np.count_nonzero(self._rewards >= self.options.aim) >= self.options.enough
+        settles = np.count_nonzero(self._successes()) >= self.options.enough
         n_far = 0 if settles else round(self.options.spread * n)
         drawn = self._gp.sample(candidates, n - n_far, self._rng)
         if settles:
@@ -101,11 +105,12 @@ class BOLearner(Learner):
         self._spread = np.asarray(theta.std(axis=0))
         return theta
 
-    def _update(self, theta: FloatArray, rewards: FloatArray, _meta: Meta, /) -> None:
+    def _update(self, theta: FloatArray, rewards: FloatArray, meta: Meta, /) -> None:
+        landed = np.asarray(meta.get(LANDED, np.full(len(rewards), np.nan)), dtype=np.float64)
         self._x = np.vstack([self._x, self._scale(theta)])[-self.options.memory :]
         self._rewards = np.append(self._rewards, rewards)[-self.options.memory :]
-        doubted = self._expected < self.options.aim <= self._rewards.max()
-        follow = len(self._x) > self.options.settled and not doubted
+        self._landed = np.append(self._landed, landed)[-self.options.memory :]
+        follow = len(self._x) > self.options.settled and not self._doubted()
         self._hyper = fit(self._x, self._values(), self._prior, self._hyper, self.options.noise_min, follow)
         self._refresh()
 
@@ -115,11 +120,24 @@ class BOLearner(Learner):
         self._best = self._safest(self._gp)
         self._expected = float(self._rewards.mean() + self._rewards.std() * self._gp.fitted.max())
 
+    def _successes(self) -> npt.NDArray[np.bool_]:
+        """Which of the remembered rollouts were successes: as told, else those in the upper half of the returns."""
+        guessed = self._rewards > (self._rewards.min() + self._rewards.max()) / 2
+        return np.asarray(np.where(np.isnan(self._landed), guessed, self._landed == 1))
+
+    def _doubted(self) -> bool:
+        """Whether the model, before it is refitted, expects of no policy what a success is worth."""
+        success = self._successes()
+        if not success.any() or success.all():
+            return False
+        worth = (self._rewards[success].mean() + self._rewards[~success].mean()) / 2
+        return bool(self._expected < worth)
+
     def _values(self) -> FloatArray:
         """Returns, standardised; all equal gives zeros."""
-        scale = self._rewards.std()
-        centered = self._rewards - self._rewards.mean()
-        return np.asarray(centered / scale) if scale > 0 else centered
+        if np.ptp(self._rewards) == 0:  # rounding of the mean leaves a spread, which must not pass for one of returns
+            return np.zeros(len(self._rewards))
+        return np.asarray((self._rewards - self._rewards.mean()) / self._rewards.std())
 
     def _candidates(self, gp: GaussianProcess) -> FloatArray:
         uniform = self._uniform(self.options.n_uniform, self._rng)
@@ -196,6 +214,7 @@ class BOLearner(Learner):
         return {
             "z": self._x.tolist(),
             "rewards": self._rewards.tolist(),
+            "landed": [None if np.isnan(value) else int(value) for value in self._landed],
             "lengths": self._hyper.lengths.tolist(),
             "noise": self._hyper.noise,
             "spread": self._spread.tolist(),
@@ -205,6 +224,7 @@ class BOLearner(Learner):
         self._setup()
         self._x = np.array(state["z"], dtype=np.float64).reshape(-1, self.dim)
         self._rewards = np.array(state["rewards"], dtype=np.float64)
+        self._landed = np.array([np.nan if value is None else value for value in state["landed"]], dtype=np.float64)
         self._hyper = Hyper(np.array(state["lengths"], dtype=np.float64), float(state["noise"]))
         self._spread = np.array(state["spread"], dtype=np.float64)
         if self._rewards.size:

@@ -2,8 +2,8 @@
 
 With theta_n ~ N(mu, diag sigma^2), returns R_n >= 0 and weights w_n:
 
-    mu'      = sum(w_n theta_n) / (sum(w_n) + eps)                                    (1)
-    sigma'^2 = sum(w_n (theta_n - c)^2) / (sum(w_n) + eps)                            (2)
+    mu'      = sum(w_n theta_n) / sum(w_n)                                            (1)
+    sigma'^2 = sum(w_n (theta_n - c)^2) / sum(w_n)                                    (2)
 
     weight "return":     w_n = R_n, over the K best of N                              (3, EPHE-K)
     weight "above_mean": w_n = max(0, R_n - mean(R)), over the K best of N            (4, EPHE-AB)
@@ -15,7 +15,9 @@ robust one:
 
     sigma'' = max(sigma', shrink_min sigma, sigma_floor)                              (5)
 
-All weights zero: no update. Fewer rollouts than K: all of them count.
+All weights zero: no update. Fewer rollouts than K: all of them count. The code of 2021 adds 0.001 to the denominators
+against a division by zero, which pulls mu towards zero by a few parts in a million; it is left out here, since it would
+tie the search to the scale of the returns.
 """
 
 from collections.abc import Mapping
@@ -33,9 +35,6 @@ class EpheOptions(Options):
     n_best: int | None = Field(default=3, ge=1, description="K: rollouts that count; null: all")
     weight: Literal["return", "above_mean"] = Field(default="return", description="equation (3) or (4)")
     sigma_ref: Literal["new", "old"] = Field(default="old", description="mean that sigma is taken about")
-    eps: float = Field(
-        default=0.0, ge=0, le=1, description="added to the denominators; 0.001 reproduces the code of 2021"
-    )
     shrink_min: float = Field(
         default=0.0, ge=0, le=1, description="sigma keeps at least this share of itself per episode"
     )
@@ -69,14 +68,14 @@ class EPHE(Learner):
         options = self.options
         best = np.argsort(-rewards, kind="stable")[: options.n_best]
         weights = _weights(rewards, options.weight)[best]
-        total = weights.sum() + options.eps
+        total = weights.sum()
         if not weights.any():
             return
         mu = weights @ theta[best] / total  # (1)
         center = mu if options.sigma_ref == "new" else self._mu
         sigma = np.sqrt(weights @ (theta[best] - center) ** 2 / total)  # (2)
         sigma = np.maximum(sigma, np.maximum(options.shrink_min * self._sigma, options.sigma_floor))  # (5)
-        # neither line acts on what was drawn here, except that eps > 0 pulls (1) towards zero, which may lie outside
+        # neither line acts on policies that were drawn here, but others may have been told
         self._mu = np.clip(mu, self.lo, self.hi)
         self._sigma = np.minimum(sigma, self.hi - self.lo)
 
@@ -101,4 +100,8 @@ class RobustEPHE(EPHE):
 
 def _weights(rewards: FloatArray, kind: str) -> FloatArray:
     """Equation (3) or (4)."""
-    return rewards if kind == "return" else np.maximum(0.0, rewards - rewards.mean())
+    if kind == "return":
+        return rewards
+    if np.ptp(rewards) == 0:  # rounding of the mean must not make weights of equal returns
+        return np.zeros(len(rewards))
+    return np.asarray(np.maximum(0.0, rewards - rewards.mean()))

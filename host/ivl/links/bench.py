@@ -8,7 +8,8 @@ import numpy as np
 
 from ivl import campaign, experiment, native
 from ivl.experiment import Experiment
-from ivl.learn import LearningRun
+from ivl.layout import layout_of
+from ivl.learning.loop import LearningRun
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.silproc import SilProcess
 from ivl.source import Plan, RolloutSource, WorldSource
@@ -53,7 +54,7 @@ def _learn(chosen: Experiment, source: RolloutSource) -> float:
     with tempfile.TemporaryDirectory() as folder:
         manifest = campaign.make_manifest(chosen, chosen.make_world())
         dtype = native.library().outcome_dtype
-        with RunStore.create(Path(folder) / "run", chosen.to_yaml(), manifest, dtype) as store:
+        with RunStore.create(Path(folder) / "run", chosen.to_yaml(), manifest, dtype, layout_of(chosen)) as store:
             began_s = time.monotonic()
-            LearningRun(chosen, source, store).run()
+            LearningRun([chosen], source, store).run()
             return time.monotonic() - began_s

@@ -33,7 +33,7 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Rollout:
-    """What is to be flown: policy (in the units of its form) and the numbers that make a simulated landing repeatable."""
+    """What is to be flown: policy (units of its form) and the numbers that make a simulated landing repeatable."""
 
     theta: tuple[float, ...]
     seed: int = 0

@@ -124,9 +124,7 @@ def encode_policy(seq: int, form: forms.Form, theta: npt.ArrayLike) -> list[byte
     for part, first in enumerate(range(0, form.n, len(names))):
         own = values[first : first + len(names)].tolist() + [0.0] * len(names)
         thetas = dict(zip(names, own, strict=False))
-        packets.append(
-            encode(PacketType.POLICY, seq=seq, crc=crc, form=form.number, n=form.n, part=part, **thetas)
-        )
+        packets.append(encode(PacketType.POLICY, seq=seq, crc=crc, form=form.number, n=form.n, part=part, **thetas))
     return packets
 
 

@@ -14,9 +14,10 @@ from matplotlib.ticker import MaxNLocator
 from ivl import model
 from ivl.analysis import region
 from ivl.analysis.intervals import Estimate
-from ivl.analysis.rates import RATE, SOLVED_RATE
+from ivl.analysis.rates import RATE
 from ivl.analysis.separability import separability
 from ivl.errors import ConfigError
+from ivl.outcome import solved
 from ivl.plots import style
 from ivl.sweep import store
 from ivl.sweep.schema import VARIED, varied_columns
@@ -80,7 +81,7 @@ class Campaign:
 
     def solved(self) -> pd.Series:
         """Mask of the trials that triggered and reached a landing rate of 0.8."""
-        return (self.trials["n_triggered"] > 0) & (self.trials[RATE] >= SOLVED_RATE)
+        return (self.trials["n_triggered"] > 0) & solved(self.trials[RATE])
 
     def title(self, *columns: str) -> str:
         """Values of some columns of `SETUP`, in words."""

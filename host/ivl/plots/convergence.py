@@ -9,10 +9,9 @@ from matplotlib.axes import Axes
 
 from ivl.campaign import RunResult
 from ivl.experiment import Experiment
-from ivl.learn import RECENT_EPISODES
-from ivl.outcome import clean, four_leg
+from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
+from ivl.outcome import RECENT_EPISODES, clean, four_leg
 from ivl.plots import style
-from ivl.store import SCORED, EpisodeRow, RolloutRows
 
 _SHOWN_MAX = 8  # parameters in the figure, the first of a longer form
 _FLOWN_COLOURS = (style.PURPLE, style.DIM)

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 
 from ivl.analysis.rates import RATE
 from ivl.errors import ConfigError
-from ivl.learn import RECENT_EPISODES
+from ivl.outcome import RECENT_EPISODES
 from ivl.plots import style
 from ivl.plots.campaign import Campaign
 

@@ -13,7 +13,8 @@ import numpy.typing as npt
 import pandas as pd  # type: ignore[import-untyped]
 
 from ivl import model
-from ivl.analysis.rates import SOLVED_RATE, cell_rates, mean_rate
+from ivl.analysis.rates import cell_rates, mean_rate
+from ivl.outcome import SOLVED_SHARE, solved
 from ivl.plots import campaign, style
 from ivl.plots.campaign import RATE_MAP, Campaign
 
@@ -46,7 +47,7 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
     bar = figure.colorbar(image, ax=grid[:, :], location="bottom", shrink=0.5, aspect=35, pad=0.03)
     bar.set_label("four-leg landing rate, mean of the trials; dot: solved by some trial only", fontsize=style.NORMAL)
     bar.ax.tick_params(labelsize=style.SMALL)
-    bar.ax.axvline(SOLVED_RATE, color="black", linewidth=1)
+    bar.ax.axvline(SOLVED_SHARE, color="black", linewidth=1)
     figure.suptitle(data.title("gear_set", "vehicle", "learner"), fontsize=style.NORMAL)
     return style.save(figure, paths, dpi)
 
@@ -58,7 +59,7 @@ def _draw_disc(axis: Any, cells: pd.DataFrame) -> Any:
     image = axis.pcolormesh(
         _edges(angle), _edges(speed), table.to_numpy(), cmap=RATE_MAP, vmin=0, vmax=1, rasterized=True
     )
-    lucky = cells[(cells["rate_mean_norm"] < SOLVED_RATE) & (cells["n_solved"] > 0)]
+    lucky = cells[~solved(cells["rate_mean_norm"]) & (cells["n_solved"] > 0)]
     axis.scatter(np.deg2rad(lucky["angle_deg"]), lucky["speed_mps"], s=2.2, color="white", linewidths=0)
     axis.set_thetalim(0, np.pi / 2)
     axis.set_rlim(0, _edges(speed)[-1])

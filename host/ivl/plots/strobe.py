@@ -16,10 +16,10 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from ivl.campaign import RunResult
+from ivl.learning.recorder import SCORED
 from ivl.outcome import four_leg
 from ivl.plots import style
 from ivl.seeds import Purpose, derive
-from ivl.store import SCORED
 from ivl.world import Trace, World, rotation
 
 N_GHOSTS = 8

@@ -6,6 +6,7 @@ from typing import Any
 
 from ivl.landing import LandingSpec
 from ivl.report import replay
+from ivl.rewards import RewardChoice
 from ivl.world import World
 
 Key = tuple[Any, ...]
@@ -16,11 +17,13 @@ class Album:
     """Landings in the order in which the page numbers them.
 
     Attributes:
+        reward: What the run paid for landings.
         landings: Packed landings.
         geometry: Shapes of each world that they were flown in, by its name.
         n_different: Landings that did not come out as the run recorded them.
     """
 
+    reward: RewardChoice
     landings: list[dict[str, Any]] = field(default_factory=list)
     geometry: dict[str, dict[str, Any]] = field(default_factory=dict)
     n_different: int = 0
@@ -38,7 +41,8 @@ class Album:
         world = self._world(spec)
         _, trace = spec.fly(world)
         self.n_different += not as_recorded(trace.outcome)
-        self.landings.append({"label": label, "geometry": self._names[_key(spec)], **replay.pack(spec, world, trace)})
+        packed = replay.pack(spec, world, trace, self.reward)
+        self.landings.append({"label": label, "geometry": self._names[_key(spec)], **packed})
         return len(self.landings) - 1
 
     def fact(self) -> list[str]:

@@ -10,12 +10,13 @@ import numpy as np
 from ivl import campaign, landing, native
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
+from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
 from ivl.outcome import four_leg
 from ivl.plots.convergence import outcome_classes
 from ivl.report import replay
 from ivl.report.landings import Album, thinned
-from ivl.report.page import encode, flatten, learner_words
-from ivl.store import SCORED, EpisodeRow, RolloutRows, RunStore, read_manifest
+from ivl.report.page import axis_from_zero, encode, fine_unit, flatten, learner_words, parameter_names, reward_names
+from ivl.store import RunStore, read_manifest
 
 
 def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], None]) -> tuple[dict[str, Any], Album]:
@@ -32,7 +33,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
     experiment, n_trials = campaign.read_config(folder)
     with RunStore.open_existing(folder, native.library().outcome_dtype) as store:
         history, rollouts = store.episodes(), store.rollouts(trial=0)
-    album, numbers = Album(), np.full(len(rollouts), -1)
+    album, numbers = Album(experiment.reward), np.full(len(rollouts), -1)
     scored = np.flatnonzero(rollouts.status == SCORED)
     if not scored.size:
         raise StoreError(f"{folder}: no rollout is finished, there is nothing to report")
@@ -50,6 +51,8 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
         "scale": replay.SCALE,
         "geometry": album.geometry,
         "landings": album.landings,
+        "terms": reward_names(experiment.reward),
+        "parameters": parameter_names(experiment.policy.shape),
         "learn": {
             "episodes": [_episodes(experiment, history, trial) for trial in range(n_trials or 1)],
             "rollouts": _rollouts(rollouts, numbers),
@@ -118,13 +121,14 @@ def _verdict(path: Path, n_trials: int) -> list[list[str]]:
 def _episodes(experiment: Experiment, history: list[EpisodeRow], trial: int) -> dict[str, Any]:
     """The search of one trial, from its start on; rate and return begin with the first episode."""
     own = [row for row in history if row.trial == trial]
+    returns = [np.nan, *(row.reward_mean for row in own)]
     start = experiment.policy.parameters
     return {
         "at": [experiment.n_rollouts * k for k in range(len(own) + 1)],
         "mu": [encode([p.mu0, *(row.mu[i] for row in own)], 1e-3) for i, p in enumerate(start)],
         "sigma": [encode([p.sigma0, *(row.sigma[i] for row in own)], 1e-3) for i, p in enumerate(start)],
         "rate": encode([np.nan, *(row.rate_four_leg for row in own)], 1e-3),
-        "reward": encode([np.nan, *(row.reward_mean for row in own)], 1e-2),
+        "reward": encode(returns, fine_unit(returns, 5)),
     }
 
 
@@ -137,7 +141,7 @@ def _rollouts(rollouts: RolloutRows, numbers: Any) -> dict[str, Any]:
         "at": list(range(1, len(rollouts) + 1)),
         "kind": kind.tolist(),
         "theta": [encode(column, 1e-3) for column in rollouts.theta.T],
-        "reward": encode(rollouts.reward, 1e-2),
+        "reward": encode(rollouts.reward, fine_unit(rollouts.reward, 5)),
         "landing": numbers.tolist(),
     }
 
@@ -148,4 +152,4 @@ def _limits(experiment: Experiment, rollouts: RolloutRows) -> list[list[float]]:
     for bounds, flown in zip(experiment.policy.bounds, rollouts.theta.T, strict=True):
         lo, hi = min(bounds[0], flown.min()), max(bounds[1], flown.max())
         limits.append([float(lo - 0.03 * (hi - lo)), float(hi + 0.03 * (hi - lo))])
-    return [*limits, [-0.03, 1.05], [0.0, 190.0]]
+    return [*limits, [-0.03, 1.05], axis_from_zero(rollouts.reward)]

@@ -58,19 +58,24 @@ function fillHeader(data) {
 function showLearn(data, replay) {
   const learn = data.learn, rollouts = { at: learn.rollouts.at, kind: learn.rollouts.kind, theta: learn.rollouts.theta.map(column), reward: column(learn.rollouts.reward), landing: learn.rollouts.landing };
   const series = learn.episodes.map(seriesOf), draw = (trial) => {
-    const figure = convergenceFigure(series[trial], series.filter((_, i) => i !== trial), trial === 0 ? rollouts : null, learn.limits);
+    const figure = convergenceFigure(series[trial], series.filter((_, i) => i !== trial), trial === 0 ? rollouts : null, learn.limits, data.parameters);
     Plotly.react("convergence-plot", figure.traces, figure.layout, CONFIG);
   };
   draw(0);
   $("#convergence-plot").on("plotly_click", ({ points: [point] }) => { if (point.customdata !== undefined) replay.show(0, rollouts.landing[point.customdata]); });
   if (series.length > 1) fillChoice($("#trial"), learn.episodes.map((_, i) => `trial ${i}`), draw);
   $("#notable").hidden = false;
-  table($("#notable-table"), ["landing", "return", "feet", "RREV_c, 1/s", "M_yd, N mm", "replay"], learn.notable.map(({ what, landing }) => {
+  table($("#notable-table"), ["landing", "return", ...data.terms.map(([name]) => name), "feet", ...shown(data.parameters).map(headOf), "replay"], learn.notable.map(({ what, landing }) => {
     const { outcome, spec } = data.landings[landing];
-    return [what, outcome.reward.toFixed(1), `${outcome.n_legs}${outcome.body_contact ? ", body" : ""}`, spec.rrev_c_per_s.toFixed(2), spec.moment_y_Nmm.toFixed(2), replayButtons(replay, landing, what)];
+    return [what, figures(outcome.reward), ...data.terms.map(([name]) => figures(outcome.terms[name])), `${outcome.n_legs}${outcome.body_contact ? ", body" : ""}`, ...shown(spec.theta).map((value) => value.toFixed(2)), replayButtons(replay, landing, what)];
   }));
   $("#convergence-note").textContent = "Rate: share of landings on three or four legs in an episode. Click a dot to replay that rollout in view A.";
   [1, 0].forEach((pane) => replay.show(pane, learn.notable[learn.first_shown[pane]].landing));
+}
+
+// A term of the return as text; its scale is the reward's own.
+function figures(value) {
+  return String(Number(value.toPrecision(4)));
 }
 
 function seriesOf(stored) {
@@ -89,12 +94,14 @@ class SweepView {
   constructor(data, replay) {
     this.sweep = data.sweep;
     this.data = data;
+    this.parameters = data.parameters;
     this.replay = replay;
     this.cells = this.rowsOf(this.sweep.cells).map((cell, id) => ({ ...cell, id }));
     this.trials = this.rowsOf(this.sweep.trials);
     fillChoice($("#gear"), this.sweep.gears.map(readable), () => this.chooseByMenu());
     fillChoice($("#speed-choice"), this.sweep.speeds.map((v) => `${v} m/s`), () => this.chooseByMenu());
     fillChoice($("#angle-choice"), this.sweep.angles.map((v) => `${v}°`), () => this.chooseByMenu());
+    shown(this.parameters).forEach((parameter, i) => $("#region-colour").add(new Option(headOf(parameter), i)));
     ["#region-colour", "#region-gear"].forEach((id) => $(id).addEventListener("change", () => this.drawRegion()));
     this.sweep.gears.forEach((gear, i) => $("#region-gear").add(new Option(readable(gear), i)));
     ["#rates", "#region"].forEach((id) => { $(id).hidden = false; });
@@ -139,8 +146,8 @@ class SweepView {
     $("#cell-title").textContent = `${readable(sweep.gears[cell.gear])}, ${sweep.speeds[cell.speed]} m/s at ${sweep.angles[cell.angle]}°`;
     const own = this.trials.filter((trial) => trial.cell === cell.id);
     $("#cell-rate").textContent = `landing rate ${percent(cell.rate)} (95 % interval ${percent(cell.lo)} to ${percent(cell.hi)}, ${own.length} trials), best trial ${percent(cell.best)}`;
-    table($("#trials-table"), ["trial", "rate", "clean", "RREV_c, 1/s", "M_yd, N mm", "best landing"], own.map((t) => [String(t.trial), percent(t.rate), percent(t.clean),
-      `${t.mu_rrev.toFixed(2)} ± ${t.sigma_rrev.toFixed(2)}`, `${t.mu_moment.toFixed(2)} ± ${t.sigma_moment.toFixed(2)}`, replayButtons(this.replay, t.landing, `the best landing of trial ${t.trial}`)]));
+    table($("#trials-table"), ["trial", "rate", "clean", ...shown(this.parameters).map(headOf), "best landing"], own.map((t) => [String(t.trial), percent(t.rate), percent(t.clean),
+      ...shown(this.parameters).map((_, i) => `${t[`mu_${i}`].toFixed(2)} ± ${t[`sigma_${i}`].toFixed(2)}`), replayButtons(this.replay, t.landing, `the best landing of trial ${t.trial}`)]));
     const others = this.cells.filter((c) => this.sameApproach(c, cell)).sort((a, b) => a.gear - b.gear);
     table($("#gears-table"), ["gear at this approach", "rate", "best landing"], others.map((c) => [readable(sweep.gears[c.gear]), percent(c.rate), replayButtons(this.replay, c.landing, `the best landing of ${readable(sweep.gears[c.gear])}`)]));
     if (cell.landing >= 0) this.replay.show(0, cell.landing);
@@ -159,8 +166,8 @@ class SweepView {
     const gear = $("#region-gear").value, sweep = this.sweep;
     const own = this.trials.filter((t) => !Number.isNaN(t.rrev) && (gear === "all" || this.cells[t.cell].gear === Number(gear)));
     const pick = (name) => own.map((t) => t[name]);
-    const text = own.map((t) => { const c = this.cells[t.cell]; return `${readable(sweep.gears[c.gear])}, ${sweep.speeds[c.speed]} m/s at ${sweep.angles[c.angle]}°, trial ${t.trial}: rate ${percent(t.rate)}, M_yd ${t.mu_moment.toFixed(1)} N mm`; });
-    const figure = regionFigure({ rrev: pick("rrev"), ofY: pick("of_y"), d: pick("d"), rate: pick("rate"), moment: pick("mu_moment"), cell: pick("cell"), text }, $("#region-colour").value);
+    const text = own.map((t) => { const c = this.cells[t.cell]; return `${readable(sweep.gears[c.gear])}, ${sweep.speeds[c.speed]} m/s at ${sweep.angles[c.angle]}°, trial ${t.trial}: rate ${percent(t.rate)}, ${shown(this.parameters).map(([symbol, unit], i) => `${symbol} ${t[`mu_${i}`].toFixed(1)} ${unit}`).join(", ")}`; });
+    const figure = regionFigure({ rrev: pick("rrev"), ofY: pick("of_y"), d: pick("d"), rate: pick("rate"), parameter: pick(`mu_${$("#region-colour").value}`), cell: pick("cell"), text }, $("#region-colour").value, this.parameters);
     Plotly.react("region-plot", figure.traces, figure.layout, CONFIG);
     if (!this.regionListening) $("#region-plot").on("plotly_click", ({ points: [point] }) => this.choose(this.cells[point.customdata]));
     this.regionListening = true;
@@ -169,7 +176,7 @@ class SweepView {
   drawConvergence(trials) {
     const series = trials.map((t) => this.seriesOf(t)), best = trials.reduce((b, t, i) => (t.rate > trials[b].rate ? i : b), 0);
     const draw = (chosen) => {
-      const figure = convergenceFigure(series[chosen], series.filter((_, i) => i !== chosen), null, this.sweep.limits);
+      const figure = convergenceFigure(series[chosen], series.filter((_, i) => i !== chosen), null, this.sweep.limits, this.parameters);
       Plotly.react("convergence-plot", figure.traces, figure.layout, CONFIG);
       $("#trial").value = chosen;
     };

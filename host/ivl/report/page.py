@@ -18,7 +18,9 @@ import numpy.typing as npt
 from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
 
 import ivl
+from ivl.forms import Form
 from ivl.learners import LEARNERS
+from ivl.rewards import RewardChoice
 
 FOLDER = Path(__file__).parent
 SCRIPTS = ("data.js", "vehicle.js", "replay.js", "plots.js", "main.js")
@@ -56,6 +58,29 @@ def encode(values: npt.ArrayLike, unit: float) -> dict[str, Any]:
     numbers = np.asarray(values, dtype=np.float64)
     whole = np.rint(numbers / unit)
     return {"unit": unit, "values": [int(value) if math.isfinite(value) else None for value in whole.tolist()]}
+
+
+def fine_unit(values: npt.ArrayLike, digits: int) -> float:
+    """Unit that shows the largest of some numbers with so many digits, whatever their scale; 1 if all are 0 or NaN."""
+    numbers = np.abs(np.asarray(values, dtype=np.float64))
+    largest = float(np.max(numbers[np.isfinite(numbers)], initial=0.0))
+    return float(f"1e{math.floor(math.log10(largest)) + 1 - digits}") if largest > 0 else 1.0
+
+
+def axis_from_zero(values: npt.ArrayLike) -> list[float]:
+    """Range of an axis for numbers >= 0, whatever their scale."""
+    numbers = np.asarray(values, dtype=np.float64)
+    return [0.0, 1.06 * float(np.max(numbers[np.isfinite(numbers)], initial=0.0)) or 1.0]
+
+
+def reward_names(choice: RewardChoice) -> list[list[str]]:
+    """Name, unit and meaning of each term of a run's return."""
+    return [[term.name, term.unit, term.doc] for term in choice.reward.terms]
+
+
+def parameter_names(form: Form) -> list[list[str]]:
+    """Symbol, unit and meaning of each parameter of a form."""
+    return [[parameter.symbol, parameter.unit, parameter.doc] for parameter in form.params]
 
 
 def learner_words(name: str) -> str:

@@ -60,46 +60,68 @@ function outlineCell(div, cells, chosen) {
   return Plotly.restyle(div, { "marker.line.width": part(0), "marker.line.color": part(1) }, lines.map((_, k) => k));
 }
 
-// Trigger states of the trials in (RREV, OF_y, d), coloured by landing rate or moment.
-function regionFigure(points, colour) {
+// Trigger states of the trials in (RREV, OF_y, d), coloured by landing rate or by a parameter of the policy, whose number `colour` is.
+function regionFigure(points, colour, parameters) {
   const byRate = colour === "rate";
   const trace = { type: "scatter3d", mode: "markers", x: points.rrev, y: points.ofY, z: points.d, customdata: points.cell, text: points.text,
     hovertemplate: "%{text}<br>RREV %{x:.2f} 1/s, OF_y %{y:.2f} rad/s, d %{z:.3f} m<extra></extra>",
-    marker: { size: 2.4, color: byRate ? points.rate : points.moment, ...(byRate ? RATE_SCALE : MOMENT_SCALE), cmin: byRate ? 0 : undefined, cmax: byRate ? 1 : undefined,
-      colorbar: { title: { text: byRate ? "landing rate" : "M_yd (N mm)", side: "right" }, thickness: 12, len: 0.7, tickformat: byRate ? ".0%" : undefined } } };
+    marker: { size: 2.4, color: byRate ? points.rate : points.parameter, ...(byRate ? RATE_SCALE : MOMENT_SCALE), cmin: byRate ? 0 : undefined, cmax: byRate ? 1 : undefined,
+      colorbar: { title: { text: byRate ? "landing rate" : axisOf(parameters[Number(colour)]), side: "right" }, thickness: 12, len: 0.7, tickformat: byRate ? ".0%" : undefined } } };
   const axis = (text) => ({ title: { text, font: { size: 12 } }, backgroundcolor: "#f7f8fa", gridcolor: "#dfe4ea", showbackground: true });
   const layout = { font: FONT, height: 520, margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "keep",
     scene: { xaxis: axis("RREV (1/s)"), yaxis: axis("OF_y (rad/s)"), zaxis: axis("d (m)"), camera: { eye: { x: 1.4, y: -1.5, z: 0.65 }, center: { x: 0, y: 0, z: -0.16 } }, aspectmode: "manual", aspectratio: { x: 1.15, y: 1.15, z: 0.85 } } };
   return { traces: [trace], layout };
 }
 
-const PANELS = [["RREV_c (1/s)", "y"], ["M_yd (N mm)", "y2"], ["landing rate", "y3"], ["return", "y4"]];
+// Parameters of a policy that a table or a figure has room for: the first of a long form.
+const SHOWN_MAX = 6;
+const shown = (parameters) => parameters.slice(0, SHOWN_MAX);
+const axisOf = ([symbol, unit]) => `${symbol} (${unit})`;
+const headOf = ([symbol, unit]) => `${symbol}, ${unit}`;
 
-// Search of one trial over its rollouts: mu and mu +- 2 sigma of both parameters, landing rate, return. Thin lines: other trials.
-function convergenceFigure(series, others, rollouts, limits) {
-  const traces = others.flatMap((other) => [other.mu[0], other.mu[1], other.rate, other.reward].map((y, i) => ({ x: other.at, y, yaxis: PANELS[i][1], mode: "lines", line: { color: "#c3cad2", width: 1 }, hoverinfo: "skip", showlegend: false })));
-  [0, 1].forEach((i) => {
+// Panels of the convergence from top to bottom: title, axis, share of the height.
+function panelsOf(parameters) {
+  const titles = [...shown(parameters).map((parameter) => [axisOf(parameter), 3]), ["landing rate", 2], ["return", 2]];
+  return titles.map(([title, share], i) => ({ title, axis: i ? `y${i + 1}` : "y", share }));
+}
+
+// Domains of the panels' axes, with gaps between them.
+function domainsOf(panels) {
+  const gap = 0.025, room = 1 - gap * (panels.length - 1), all = panels.reduce((sum, { share }) => sum + share, 0);
+  let top = 1;
+  return panels.map(({ share }) => {
+    const bottom = Math.max(top - (room * share) / all, 0), domain = [bottom, top];
+    top = bottom - gap;
+    return domain;
+  });
+}
+
+// Search of one trial over its rollouts: mu and mu +- 2 sigma of each parameter, landing rate, return. Thin lines: other trials.
+function convergenceFigure(series, others, rollouts, limits, parameters) {
+  const panels = panelsOf(parameters), n = panels.length - 2, domains = domainsOf(panels), ranges = [...limits.slice(0, n), ...limits.slice(-2)];
+  const traces = others.flatMap((other) => [...other.mu.slice(0, n), other.rate, other.reward].map((y, i) => ({ x: other.at, y, yaxis: panels[i].axis, mode: "lines", line: { color: "#c3cad2", width: 1 }, hoverinfo: "skip", showlegend: false })));
+  panels.slice(0, n).forEach(({ axis }, i) => {
     const band = (sign) => series.mu[i].map((value, k) => value + 2 * sign * series.sigma[i][k]);
-    const common = { x: series.at, yaxis: PANELS[i][1], mode: "lines", line: { color: BLUE, width: 0, shape: "hv" }, hoverinfo: "skip" };
+    const common = { x: series.at, yaxis: axis, mode: "lines", line: { color: BLUE, width: 0, shape: "hv" }, hoverinfo: "skip" };
     traces.push({ ...common, y: band(-1), showlegend: false }, { ...common, y: band(1), fill: "tonexty", fillcolor: "rgba(0,114,178,0.15)", name: "µ ± 2σ", showlegend: i === 0 },
       { ...common, y: series.mu[i], line: { color: BLUE, width: 2, shape: "hv" }, hoverinfo: "x+y", name: "µ", showlegend: i === 0 });
   });
-  traces.push({ x: series.at, y: series.rate, yaxis: "y3", mode: "lines+markers", marker: { size: 4 }, line: { color: GREEN, width: 2 }, name: "four-leg rate of the episode", showlegend: false },
-    { x: series.at, y: series.reward, yaxis: "y4", mode: "lines+markers", marker: { size: 4 }, line: { color: BLUE, width: 2 }, name: "mean return of the episode", showlegend: false });
-  if (rollouts) traces.push(...outcomeDots(rollouts));
-  const layout = { font: FONT, height: 560, margin: { l: 62, r: 12, t: 8, b: 70 }, hovermode: "closest", legend: { orientation: "h", y: -0.11 },
-    xaxis: { title: { text: "rollout" }, anchor: "y4", domain: [0, 1], range: [-1, series.at[series.at.length - 1] + 1], zeroline: false } };
-  PANELS.forEach(([title, name], i) => {
-    layout[name.replace("y", "yaxis")] = { title: { text: title }, domain: [[0.72, 1], [0.42, 0.70], [0.21, 0.39], [0, 0.18]][i], zeroline: false, gridcolor: "#e6eaee", range: limits[i] };
+  traces.push({ x: series.at, y: series.rate, yaxis: panels[n].axis, mode: "lines+markers", marker: { size: 4 }, line: { color: GREEN, width: 2 }, name: "four-leg rate of the episode", showlegend: false },
+    { x: series.at, y: series.reward, yaxis: panels[n + 1].axis, mode: "lines+markers", marker: { size: 4 }, line: { color: BLUE, width: 2 }, name: "mean return of the episode", showlegend: false });
+  if (rollouts) traces.push(...outcomeDots(rollouts, panels.slice(0, n)));
+  const layout = { font: FONT, height: 260 + 150 * n, margin: { l: 62, r: 12, t: 8, b: 70 }, hovermode: "closest", legend: { orientation: "h", y: -0.11 },
+    xaxis: { title: { text: "rollout" }, anchor: panels[n + 1].axis, domain: [0, 1], range: [-1, series.at[series.at.length - 1] + 1], zeroline: false } };
+  panels.forEach(({ title, axis }, i) => {
+    layout[axis.replace("y", "yaxis")] = { title: { text: title }, domain: domains[i], zeroline: false, gridcolor: "#e6eaee", range: ranges[i] };
   });
   return { traces, layout };
 }
 
 // One dot a rollout, colour and shape by outcome; each can be clicked.
-function outcomeDots(rollouts) {
-  return OUTCOMES.flatMap(([name, color, symbol], kind) => [0, 1].map((i) => {
+function outcomeDots(rollouts, panels) {
+  return OUTCOMES.flatMap(([name, color, symbol], kind) => panels.map(({ axis }, i) => {
     const own = rollouts.kind.map((k, n) => (k === kind ? n : -1)).filter((n) => n >= 0);
-    return { x: own.map((n) => rollouts.at[n]), y: own.map((n) => rollouts.theta[i][n]), customdata: own, yaxis: PANELS[i][1], mode: "markers", name, legendgroup: name, showlegend: i === 0,
-      text: own.map((n) => `rollout ${n}: ${name}, return ${rollouts.reward[n].toFixed(1)}`), hovertemplate: "%{text}<extra>click to replay</extra>", marker: { color, symbol, size: 7 } };
+    return { x: own.map((n) => rollouts.at[n]), y: own.map((n) => rollouts.theta[i][n]), customdata: own, yaxis: axis, mode: "markers", name, legendgroup: name, showlegend: i === 0,
+      text: own.map((n) => `rollout ${n}: ${name}, return ${figures(rollouts.reward[n])}`), hovertemplate: "%{text}<extra>click to replay</extra>", marker: { color, symbol, size: 7 } };
   }));
 }

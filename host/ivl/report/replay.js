@@ -89,7 +89,7 @@ class Replay {
     const legs = `${outcome.n_legs} feet stuck`, body = outcome.body_contact || outcome.base_contact ? ", body contact" : ", clean";
     part("verdict").textContent = outcome.n_legs ? legs + body : `no foot stuck${outcome.body_contact || outcome.base_contact ? ", body contact" : ""}`;
     part("verdict").className = `verdict ${outcome.clean ? "good" : outcome.four_leg ? "fair" : "bad"}`;
-    part("spec").textContent = `V ${spec.speed_mps} m/s, φ ${spec.angle_deg}°, RREV_c ${spec.rrev_c_per_s.toFixed(3)} 1/s, M_yd ${spec.moment_y_Nmm.toFixed(2)} N mm`;
+    part("spec").textContent = `V ${spec.speed_mps} m/s, φ ${spec.angle_deg}°, ${shown(this.data.parameters).map(([symbol, unit], i) => `${symbol} ${spec.theta[i].toFixed(3)} ${unit}`).join(", ")}`;
     const offset = this.data.geometry[pane.landing.geometry].sensed_gap_offset;
     this.root.querySelector("#offset").textContent = offset ? `d sensed counts to a plane ${(1000 * offset).toFixed(0)} mm behind the ceiling.` : "";
     pane.canvas.setAttribute("aria-label", `Landing ${pane.name.toUpperCase()}: ${label}, ${part("verdict").textContent}. Arrow keys turn the view, plus and minus zoom.`);

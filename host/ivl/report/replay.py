@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ivl import native, outcome
 from ivl.landing import LandingSpec
-from ivl.reward import RewardOptions, paper
+from ivl.rewards import TOTAL, RewardChoice
 from ivl.world import Trace, World, rotation
 
 SCALE = {"t": 1e-4, "p": 1e-4, "q": 1e-4, "f": 1e-4, "pitch": 0.1, "cues": (1e-4, 1e-3, 1e-2, 1e-2)}
@@ -27,13 +27,14 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
 
 
-def pack(spec: LandingSpec, world: World, trace: Trace) -> dict[str, Any]:
+def pack(spec: LandingSpec, world: World, trace: Trace, reward: RewardChoice) -> dict[str, Any]:
     """A landing as plain data for the page.
 
     Args:
         spec: What was flown; its policy and approach are shown.
         world: Names the phases and ends.
         trace: The landing, in rows of one tick.
+        reward: What the run paid for landings.
     """
     rows = _window(trace)
     signals = _signals(world, rows)
@@ -44,7 +45,7 @@ def pack(spec: LandingSpec, world: World, trace: Trace) -> dict[str, Any]:
     # seeds are text: a browser's numbers are exact to 2^53 only
     return {
         "spec": {**spec.model_dump(mode="json"), "seed": str(spec.seed), "stream": str(spec.stream)},
-        "outcome": _result(world, trace),
+        "outcome": _result(world, trace, reward),
         "t": _integers(rows.t_s[kept][:, None], SCALE["t"])[0],
         **packed,
         "feet": _foot_events(world, rows),
@@ -185,13 +186,14 @@ def _cue_changes(rows: Any, result: Any) -> list[list[int]]:
     return _integers(cues[new], np.array(SCALE["cues"]))
 
 
-def _result(world: World, trace: Trace) -> dict[str, Any]:
-    """The outcome rounded for reading, with what it amounts to."""
+def _result(world: World, trace: Trace, reward: RewardChoice) -> dict[str, Any]:
+    """The outcome rounded for reading, with what it amounts to: `reward` is the return, `terms` what it is made of."""
     record = trace.outcome
     plain = outcome.as_dict(record, world.end_reason(record.end_reason))
     result = {k: float(f"{v:.5g}") if isinstance(v, float) else v for k, v in plain.items()}
     batch = np.array([record], dtype=native.library().outcome_dtype)
     result["four_leg"] = bool(outcome.four_leg(batch)[0])
     result["clean"] = bool(outcome.clean(batch)[0])
-    result["reward"] = round(float(paper(batch, RewardOptions()).total[0]), 2)
+    terms = {name: float(f"{float(value[0]):.5g}") for name, value in reward.score(batch).items()}
+    result["reward"], result["terms"] = terms.pop(TOTAL), terms
     return result

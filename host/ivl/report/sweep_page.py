@@ -1,20 +1,21 @@
 """What the page of an `ivl sweep` run shows: landing rates of all cells, trials and their search, best landings."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
-from ivl import reward
 from ivl.analysis.claims import evaluate
-from ivl.analysis.rates import CLEAN_RATE, RATE, SOLVED_RATE, cell_rates, rollouts_to_rate
+from ivl.analysis.rates import CLEAN_RATE, RATE, cell_rates, rollouts_to_rate
 from ivl.errors import StoreError
 from ivl.landing import LandingSpec
+from ivl.outcome import SOLVED_SHARE, solved
 from ivl.report import replay
 from ivl.report.landings import Album, thinned
-from ivl.report.page import encode, flatten, learner_words
+from ivl.report.page import axis_from_zero, encode, fine_unit, flatten, learner_words, parameter_names, reward_names
+from ivl.rewards import TOTAL
 from ivl.sweep import store
 from ivl.sweep.config import Sweep, load_sweep
 from ivl.sweep.schema import cell_columns, varied_columns
@@ -23,7 +24,6 @@ from ivl.sweep.vary import AXES, text_of
 CAMPAIGN_GEARS, CAMPAIGN_APPROACHES = 6, 100
 """A run with fewer gears or approaches says nothing about the paper's claims (which rest on 6 and 240)."""
 _PLACES = {"group": "gear", "speed_mps": "speed", "angle_deg": "angle"}
-_PARAMETERS = {"rrev": "rrev_c_per_s", "moment": "moment_y_Nmm"}
 
 
 def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], None]) -> tuple[dict[str, Any], Album]:
@@ -34,7 +34,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
     """
     manifest, sweep = store.read_manifest(folder), load_sweep(str(folder / "sweep.yaml"))
     trials, cells = _tables(folder, sweep)
-    album = Album()
+    album = Album(sweep.reward)
     trials["landing"] = _fly(sweep, trials, album, n_landings_max, on_landing)
     data = {
         "title": f"Inverted landing: {sweep.name}",
@@ -45,6 +45,8 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
         "scale": replay.SCALE,
         "geometry": album.geometry,
         "landings": album.landings,
+        "terms": reward_names(sweep.reward),
+        "parameters": parameter_names(sweep.policy.shape),
         "sweep": _encode(sweep, trials, cells, _places(cells), _episodes(folder, sweep, trials)),
     }
     return data, album
@@ -104,8 +106,8 @@ def best_landing(sweep: Sweep, trial: pd.Series) -> LandingSpec:
         gear=trial["gear"],
         speed_mps=float(trial["speed_mps"]),
         angle_deg=float(trial["angle_deg"]),
-        rrev_c_per_s=float(trial["best_rrev_c_per_s"]),
-        moment_y_Nmm=float(trial["best_moment_y_Nmm"]),
+        form=sweep.policy.form,
+        theta=[float(trial[f"best_{name}"]) for name in sweep.policy.shape.names],
         seed=int(trial["seed"]),
         stream=int(trial["best_stream"]),
     )
@@ -116,15 +118,15 @@ def _is_recorded(sweep: Sweep, trial: pd.Series) -> Callable[[Any], bool]:
     scored = sweep.at(sweep.variant_of(trial)).reward
 
     def same(record: Any) -> bool:
-        terms = reward.by_name(scored.name)(np.array([record], dtype=record.dtype), scored.options)
-        found = (float(terms.total[0]), int(record["n_legs"]), int(record["body_contact"]))
+        terms = scored.score(np.array([record], dtype=record.dtype))
+        found = (float(terms[TOTAL][0]), int(record["n_legs"]), int(record["body_contact"]))
         return found == (trial["best_reward"], trial["best_n_legs"], trial["best_body_contact"])
 
     return same
 
 
 def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list[str]]:
-    n_solved = int((cells["rate_best_norm"] >= SOLVED_RATE).sum())
+    n_solved = int(solved(cells["rate_best_norm"]).sum())
     varied = [f"{path}: {', '.join(map(text_of, given))}" for path, given in sweep.vary.items() if path not in AXES]
     return [
         ["Vehicle and gears", f"{sweep.vehicle}, {sweep.gear_set}"],
@@ -133,7 +135,7 @@ def _facts(sweep: Sweep, trials: pd.DataFrame, cells: pd.DataFrame) -> list[list
         ["Cells and trials", f"{len(cells)} cells, {_finished(sweep, trials)} trials"],
         ["Rollouts", f"{int(trials['n_rollouts'].sum()):,}"],
         ["Mean landing rate", f"{100 * cells['rate_mean_norm'].mean():.1f} %"],
-        [f"Cells with a trial of {100 * SOLVED_RATE:.0f} % or more", f"{n_solved} of {len(cells)}"],
+        [f"Cells with a trial of {100 * SOLVED_SHARE:.0f} % or more", f"{n_solved} of {len(cells)}"],
         ["Seed", str(sweep.seed)],
     ]
 
@@ -177,9 +179,10 @@ def _episodes(folder: Path, sweep: Sweep, trials: pd.DataFrame) -> dict[str, Any
     grids = {varied: sweep.at(varied) for varied in sweep.variants()}
     own = [grids[sweep.variant_of(trial)] for _, trial in trials.iterrows()]
     start = trials[keys].assign(episode=-1, rate=np.nan, reward=np.nan)
-    for parameter in _PARAMETERS.values():
-        start[f"mu_{parameter}"] = trials[f"mu0_{parameter}"]
-        start[f"sigma_{parameter}"] = [getattr(grid.policy, parameter).sigma0 for grid in own]
+    names = sweep.policy.shape.names
+    for i, name in enumerate(names):
+        start[f"mu_{name}"] = trials[f"mu0_{name}"]
+        start[f"sigma_{name}"] = [grid.policy.parameters[i].sigma0 for grid in own]
     episodes = episodes.rename(columns={RATE: "rate", "reward_mean": "reward"})
     both = pd.concat([start, episodes[start.columns]]).sort_values([*keys, "episode"], kind="stable")
     both = both.merge(trials[keys].assign(n_rollouts=[grid.n_rollouts for grid in own]), on=keys, how="left")
@@ -187,10 +190,10 @@ def _episodes(folder: Path, sweep: Sweep, trials: pd.DataFrame) -> dict[str, Any
     trials["first_episode"] = trials["n_episodes_shown"].cumsum() - trials["n_episodes_shown"]
     return {
         "at": encode((both["episode"] + 1) * both["n_rollouts"], 1.0),
-        "mu": [encode(both[f"mu_{name}"], 1e-2) for name in _PARAMETERS.values()],
-        "sigma": [encode(both[f"sigma_{name}"], 1e-2) for name in _PARAMETERS.values()],
+        "mu": [encode(both[f"mu_{name}"], 1e-2) for name in names],
+        "sigma": [encode(both[f"sigma_{name}"], 1e-2) for name in names],
         "rate": encode(both["rate"], 1e-2),
-        "reward": encode(both["reward"], 1.0),
+        "reward": encode(both["reward"], fine_unit(both["reward"], 3)),
     }
 
 
@@ -209,18 +212,22 @@ def _encode(
             "best": encode(cells["rate_best_norm"], 1e-3),
             "landing": landing.tolist(),
         },
-        "trials": _encode_trials(trials),
+        "trials": _encode_trials(trials, sweep.policy.shape.names),
         "episodes": episodes,
-        "limits": [*(_limits(sweep, trials, name) for name in _PARAMETERS.values()), [-0.03, 1.05], [0.0, 190.0]],
+        "limits": [
+            *(_limits(sweep, trials, i) for i in range(sweep.policy.shape.n)),
+            [-0.03, 1.05],
+            axis_from_zero(trials["best_reward"]),
+        ],
     }
 
 
-def _encode_trials(trials: pd.DataFrame) -> dict[str, Any]:
+def _encode_trials(trials: pd.DataFrame, names: Sequence[str]) -> dict[str, Any]:
     plain = {"cell": "cell", "trial": "trial", "landing": "landing"}
     plain |= {"first_episode": "first_episode", "n_episodes": "n_episodes_shown"}
     scaled = {"rate": (RATE, 1e-3), "clean": (CLEAN_RATE, 1e-3)}
-    for short, name in _PARAMETERS.items():
-        scaled |= {f"mu_{short}": (f"mu_{name}", 1e-2), f"sigma_{short}": (f"sigma_{name}", 1e-2)}
+    for i, name in enumerate(names):
+        scaled |= {f"mu_{i}": (f"mu_{name}", 1e-2), f"sigma_{i}": (f"sigma_{name}", 1e-2)}
     scaled |= {"rrev": ("trigger_rrev_per_s", 1e-3), "of_y": ("trigger_of_y_radps", 1e-3)}
     scaled |= {"d": ("trigger_d_ceil_m", 1e-4)}
     return {short: trials[name].astype(int).tolist() for short, name in plain.items()} | {
@@ -228,9 +235,9 @@ def _encode_trials(trials: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def _limits(sweep: Sweep, trials: pd.DataFrame, name: str) -> list[float]:
+def _limits(sweep: Sweep, trials: pd.DataFrame, i: int) -> list[float]:
     """Range of a parameter's axis: bounds, and wherever a search ended."""
-    bounds = [getattr(sweep.at(varied).policy, name).bounds for varied in sweep.variants()]
+    bounds, name = [sweep.at(varied).policy.bounds[i] for varied in sweep.variants()], sweep.policy.shape.names[i]
     lo, hi = trials[f"mu_{name}"].min(), trials[f"mu_{name}"].max()
     lo, hi = min([lo, *(each[0] for each in bounds)]), max([hi, *(each[1] for each in bounds)])
     return [float(lo - 0.03 * (hi - lo)), float(hi + 0.03 * (hi - lo))]

@@ -29,14 +29,13 @@ from ivl.experiment import (
     PerParameter,
     Policy,
     PolicyParameter,
-    RewardChoice,
     check_policy,
 )
+from ivl.rewards import RewardChoice
 from ivl.seeds import Purpose, derive, derive_from_key
 from ivl.settings import (
     PACKAGE_DIR,
     Finite,
-    Strict,
     apply_setting,
     check_overrides,
     check_path,
@@ -69,6 +68,7 @@ _SEED_HAS = ("vehicle", "gear_set")
 """Fields that the name of a cell contains, varied or not."""
 _NEVER_VARIED = ("name", "doc", "seed", "check", "flown", "overrides")
 """Fields of an experiment that say nothing of a single cell; overrides are varied by the parameter's own path."""
+_COLUMNS = ("policy.form", "reward.name")
 
 Grid = TypeVar("Grid", bound="_Grid")
 
@@ -289,8 +289,8 @@ class Sweep(_Grid):
             return self.policy
         rng = np.random.Generator(np.random.PCG64(derive(seed, Purpose.START)))
         drawn: dict[str, Any] = {}
-        for name, parameter, bounds in self._starts():
-            drawn[name] = parameter.model_copy(update={"mu0": float(rng.uniform(*bounds))})
+        for name, parameter, (lo, hi) in self._starts():
+            drawn[name] = parameter.model_copy(update={"mu0": float(rng.uniform(lo, hi))})
         return Policy(form=self.policy.form, **drawn)
 
 
@@ -368,6 +368,8 @@ def _load(
     grid = yamlfile.validate(kind, data, file.name)
     check_overrides(grid.overrides, file.name)
     for name in grid.vary:
+        if name in _COLUMNS:
+            raise ConfigError(f"{file.name}: vary: {name}: decides which columns a run has: sweep each value by itself")
         check_path(name, varied, f"{file.name}: vary", _NEVER_VARIED)
     try:
         _check_variants(grid)

@@ -13,6 +13,7 @@ import ivl
 from ivl import native, yamlfile
 from ivl.campaign import git_commit
 from ivl.errors import ConfigError, StoreError
+from ivl.layout import EMPTY, layout_of
 from ivl.store import lock_folder, write_durably, write_json
 from ivl.sweep import schema, store
 from ivl.sweep.config import PolicyMap, Sweep
@@ -70,6 +71,7 @@ def open_run(run: Path, grid: Sweep | PolicyMap, worlds: Mapping[str, World], ta
 def make_manifest(grid: Sweep | PolicyMap, worlds: Mapping[str, World], task_size: int) -> dict[str, Any]:
     """What identifies a run: resolved file, hashes, versions, seed, units."""
     kinds = (schema.MAP,) if isinstance(grid, PolicyMap) else (schema.TRIALS, schema.EPISODES, schema.ROLLOUTS)
+    layout = EMPTY if isinstance(grid, PolicyMap) else layout_of(grid)
     return {
         "schema_version": schema.SCHEMA_VERSION,
         _kind(grid): grid.model_dump(mode="json"),
@@ -88,7 +90,8 @@ def make_manifest(grid: Sweep | PolicyMap, worlds: Mapping[str, World], task_siz
         "packages": {name: version(name) for name in _PACKAGES},
         "platform": platform.platform(),
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "units": {kind: schema.units(kind) for kind in kinds},
+        "units": {kind: schema.units(kind, layout) for kind in kinds},
+        "layout": layout.to_dict(),
     }
 
 

@@ -1,6 +1,6 @@
 """The tables of a sweep, column by column: one description for whoever writes them and whoever reads them.
 
-    RUN/manifest.json       what was run: resolved sweep, versions, hashes, units, schema version
+    RUN/manifest.json       what was run: resolved sweep, versions, hashes, units, schema version, layout
     RUN/sweep.yaml          the resolved sweep file
     RUN/trials/*.parquet    one row per trial
     RUN/episodes/*.parquet  one row per trial and episode
@@ -11,8 +11,10 @@
 
 A path that a sweep varies and that has no column here has one of its own, `vary.` and the path, at the end of every
 table but `tasks`. The name of every other column ends with its unit; `_norm` is a share in 0 .. 1, a count or a number
-without unit has no suffix. Each field carries `unit` and `doc` in its metadata, each file the schema version. A
-quantity that does not exist (no rollout was triggered, no foot stuck) is NaN, never zero; nothing is null.
+without unit has no suffix. Each field carries `unit` and `doc` in its metadata, each file the schema version. Columns
+of the policy are made from the names of its parameters, those of the return from the terms of the run's reward: both
+are the run's layout. A quantity that does not exist (no rollout was triggered, no foot stuck) is NaN, never zero;
+nothing is null.
 """
 
 from collections.abc import Iterable
@@ -21,8 +23,9 @@ from functools import cache
 import pyarrow as pa  # type: ignore[import-untyped]
 
 from ivl import native
+from ivl.layout import EMPTY, Layout
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 VERSION_KEY = b"ivl_schema_version"
 
 TRIALS, EPISODES, ROLLOUTS, MAP, FAILURES, TASKS = "trials", "episodes", "rollouts", "map", "failures", "tasks"
@@ -67,14 +70,19 @@ def cell_columns(names: Iterable[str]) -> list[str]:
     return [*(name for name in CELL if name in names), *varied_columns(names)]
 
 
-def schema(kind: str) -> pa.Schema:
-    """The columns of one kind of table (see `KINDS`)."""
-    return _schemas()[kind]
+def schema(kind: str, layout: Layout = EMPTY) -> pa.Schema:
+    """The columns of one kind of table.
+
+    Args:
+        kind: See `KINDS`.
+        layout: Policy and reward of the run; kinds of tables that tell of neither do without.
+    """
+    return _schemas(layout)[kind]
 
 
-def units(kind: str) -> dict[str, str]:
-    """Unit of each column of one kind of table."""
-    return {f.name: f.metadata[b"unit"].decode() for f in schema(kind)}
+def units(kind: str, layout: Layout = EMPTY) -> dict[str, str]:
+    """Unit of each column of one kind of table (arguments as `schema`)."""
+    return {f.name: f.metadata[b"unit"].decode() for f in schema(kind, layout)}
 
 
 def outcome_columns() -> dict[str, tuple[str, int]]:
@@ -88,12 +96,16 @@ def outcome_columns() -> dict[str, tuple[str, int]]:
     return columns
 
 
-def _policy(prefix: str, doc: str) -> list[pa.Field]:
-    """Two columns for a quantity of both policy parameters."""
-    return [
-        field(f"{prefix}_rrev_c_per_s", _F8, "1/s", f"{doc}: trigger threshold RREV_c"),
-        field(f"{prefix}_moment_y_Nmm", _F8, "N mm", f"{doc}: moment M_yd"),
-    ]
+def _policy(layout: Layout, prefix: str, doc: str) -> list[pa.Field]:
+    """One column for each parameter of the policy."""
+    names = layout.policy_columns(prefix)
+    return [field(name, _F8, p.unit, f"{doc}: {p.doc}") for name, p in zip(names, layout.policy, strict=True)]
+
+
+def _terms(layout: Layout, prefix: str, doc: str) -> list[pa.Field]:
+    """One column for each term of the reward."""
+    names = layout.term_columns(prefix)
+    return [field(names[term.name], _F8, term.unit, f"{doc}: {term.doc}") for term in layout.terms]
 
 
 def _cell() -> list[pa.Field]:
@@ -136,7 +148,7 @@ def _rates(doc: str) -> list[pa.Field]:
     ]
 
 
-def _trials() -> Iterable[pa.Field]:
+def _trials(layout: Layout) -> Iterable[pa.Field]:
     recent = "over the last three episodes"
     yield from _trial_key()
     yield field("run_seed", _I8, "1", "seed of the trial: `ivl learn --seed` with it repeats the trial")
@@ -154,10 +166,11 @@ def _trials() -> Iterable[pa.Field]:
     yield from _rates(recent)
     yield field("n_recent", _I4, "1", f"rollouts that count {recent}")
     yield field("reward_mean", _F8, "1", f"mean return {recent}")
-    yield from _policy("mu0", "centre of the search at the start")
-    yield from _policy("mu", "centre of the search at the end")
-    yield from _policy("sigma", "spread of the search at the end")
-    yield from _policy("recommended", "policy that the learner recommends at the end")
+    yield from _terms(layout, "reward_mean", f"mean term of the return {recent}")
+    yield from _policy(layout, "mu0", "centre of the search at the start")
+    yield from _policy(layout, "mu", "centre of the search at the end")
+    yield from _policy(layout, "sigma", "spread of the search at the end")
+    yield from _policy(layout, "recommended", "policy that the learner recommends at the end")
     yield field("n_check", _I4, "1", "fresh rollouts of the recommended policy (0: not checked)")
     yield field("check_rate_four_leg_norm", _F8, "1", "four-leg rate of the recommended policy over the fresh rollouts")
     yield field("check_rate_clean_norm", _F8, "1", "clean rate of the recommended policy over the fresh rollouts")
@@ -170,39 +183,40 @@ def _trials() -> Iterable[pa.Field]:
     yield field(
         "best_stream", _I8, "1", "its number within the seed: replay with seed, best_stream and policy, bit for bit"
     )
-    yield from _policy("best", "its policy")
+    yield from _policy(layout, "best", "its policy")
     yield field("best_reward", _F8, "1", "its return")
     yield field("best_n_legs", _I4, "1", "its feet stuck at the end")
     yield field("best_body_contact", _I4, "1", "1 if its body or rotor touched the ceiling")
 
 
-def _episodes() -> Iterable[pa.Field]:
+def _episodes(layout: Layout) -> Iterable[pa.Field]:
     yield from _trial_key()
     yield field("episode", _I4, "1", "number of the episode, from 0")
     yield field("n_scored", _I4, "1", "rollouts that were learned from")
-    yield from _policy("mu", "centre of the search after the episode")
-    yield from _policy("sigma", "spread of the search after the episode")
-    yield from _policy("recommended", "policy recommended after the episode")
+    yield from _policy(layout, "mu", "centre of the search after the episode")
+    yield from _policy(layout, "sigma", "spread of the search after the episode")
+    yield from _policy(layout, "recommended", "policy recommended after the episode")
     yield field("reward_mean", _F8, "1", "mean return of the episode")
+    yield from _terms(layout, "reward_mean", "mean term of the return")
     yield from _rates("of the episode")
 
 
-def _rollouts() -> Iterable[pa.Field]:
+def _rollouts(layout: Layout) -> Iterable[pa.Field]:
     yield from _trial_key()
     yield field("episode", _I4, "1", "number of the episode, from 0")
     yield field("idx", _I4, "1", "place within the episode")
     yield field("seed", _I8, "1", "seed of the world's random numbers")
     yield field("stream", _I8, "1", "number of the rollout within the seed")
-    yield field("rrev_c_per_s", _F8, "1/s", "policy as flown: trigger threshold RREV_c")
-    yield field("moment_y_Nmm", _F8, "N mm", "policy as flown: moment M_yd")
+    yield from _policy(layout, "", "policy as flown")
     yield field("scored", pa.bool_(), "1", "false: the simulation could not bring it to an end, not learned from")
     yield field("reward", _F8, "1", "return; NaN if not scored")
+    yield from _terms(layout, "reward", "term of the return; NaN if not scored")
     for column, (name, _) in outcome_columns().items():
         entry = native.library().outcome_fields[name]
         yield field(column, pa.from_numpy_dtype(entry.type), entry.unit, entry.doc)
 
 
-def _map() -> Iterable[pa.Field]:
+def _map(_: Layout) -> Iterable[pa.Field]:
     yield from (f for f in _cell() if f.name != "learner")
     yield field("d_ceil_m", _F8, "m", "distance of the body origin from the plane of the cues, where the flip starts")
     yield field("moment_Nmm", _F8, "N mm", "moment M_yd")
@@ -223,14 +237,14 @@ def _map() -> Iterable[pa.Field]:
     yield from _contact("of this point")
 
 
-def _failures() -> Iterable[pa.Field]:
+def _failures(_: Layout) -> Iterable[pa.Field]:
     yield from _trial_key()
     yield field("task", _I4, "1", "number of the task")
     yield field("error", pa.string(), "1", "kind and message of the error")
     yield field("traceback", pa.string(), "1", "where it was raised")
 
 
-def _tasks() -> Iterable[pa.Field]:
+def _tasks(_: Layout) -> Iterable[pa.Field]:
     yield field("task", _I4, "1", "number of the task")
     yield field("n_trials", _I4, "1", "trials (or map points) finished")
     yield field("n_failed", _I4, "1", "trials that failed")
@@ -242,9 +256,9 @@ def _tasks() -> Iterable[pa.Field]:
 
 
 @cache
-def _schemas() -> dict[str, pa.Schema]:
+def _schemas(layout: Layout) -> dict[str, pa.Schema]:
     metadata = {VERSION_KEY: str(SCHEMA_VERSION).encode()}
     makers = {
         TRIALS: _trials, EPISODES: _episodes, ROLLOUTS: _rollouts, MAP: _map, FAILURES: _failures, TASKS: _tasks,
     }  # fmt: skip
-    return {kind: pa.schema(list(make()), metadata=metadata) for kind, make in makers.items()}
+    return {kind: pa.schema(list(make(layout)), metadata=metadata) for kind, make in makers.items()}

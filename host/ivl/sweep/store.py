@@ -16,7 +16,8 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import xarray as xr
 
 from ivl.errors import StoreError
-from ivl.store import write_durably
+from ivl.layout import Layout
+from ivl.store import check_version, write_durably
 from ivl.sweep import schema
 from ivl.sweep.schema import CELL, KINDS, SCHEMA_VERSION, TASKS, TRIAL_KEY, VERSION_KEY
 
@@ -45,21 +46,25 @@ def read_manifest(run: Path | str) -> dict[str, Any]:
         raise StoreError(f"{path}: cannot be read: {error}") from error
     if not isinstance(manifest, dict) or not {"sweep", "map"} & set(manifest):
         raise StoreError(f"{path}: is not the manifest of a sweep or map")
-    if manifest.get("schema_version") != SCHEMA_VERSION:
-        version = manifest.get("schema_version")
-        raise StoreError(f"{path}: schema_version {version!r}, this program reads {SCHEMA_VERSION}")
+    check_version(run, manifest, SCHEMA_VERSION)
     return manifest
+
+
+def read_layout(run: Path | str) -> Layout:
+    """What the columns of a run's policies and returns are (errors as `read_manifest`)."""
+    return Layout.from_dict(read_manifest(run)["layout"])
 
 
 def read_table(run: Path | str, kind: str) -> pa.Table:
     """One kind of table of a run (see `schema.KINDS`), its key in ascending order; no rows if nothing was kept.
 
     Raises:
-        StoreError: A file cannot be read or has other columns than this version writes.
+        StoreError: The folder holds no sweep of this version, or a file cannot be read or has other columns than this
+            version writes.
     """
     if kind not in KINDS:
         raise StoreError(f"{run}: no table {kind!r} (allowed {', '.join(KINDS)})")
-    wanted = schema.schema(kind)
+    wanted = schema.schema(kind, read_layout(run))
     paths = sorted((Path(run) / kind).glob("*.parquet"))
     parts = [_read_part(path, wanted) for path in paths]
     if not parts:
@@ -88,7 +93,7 @@ def read_frame(run: Path | str, kind: str) -> pd.DataFrame:
 
 
 def read_trials(run: Path | str) -> pd.DataFrame:
-    """One row per trial; columns as `schema.schema("trials")`."""
+    """One row per trial; columns as `schema.schema("trials", layout)`."""
     return read_frame(run, schema.TRIALS)
 
 

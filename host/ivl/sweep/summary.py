@@ -3,13 +3,12 @@
 from typing import Any
 
 from ivl import yamlfile
+from ivl.analysis.rates import RATE, cell_rates, of_solved_cells
+from ivl.outcome import solved, stuck
 from ivl.sweep import plan, schema, store
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.engine import Result
 from ivl.sweep.vary import AXES, Value, as_cell, values
-
-STUCK_RATE, SOLVED_RATE = 0.5, 0.8
-"""A trial is stuck below the first if another trial of its cell reached the second."""
 
 
 def of_plan(grid: Sweep | PolicyMap, task_size: int) -> dict[str, Any]:
@@ -76,16 +75,12 @@ def by_variant(sweep: Sweep, trials: Any) -> list[tuple[dict[str, Value], Any]]:
 
 
 def _learned(trials: Any) -> dict[str, Any]:
-    cells = trials.groupby(schema.cell_columns(trials), observed=True)
-    rate = "landing_rate_four_leg_norm"
-    best = cells[rate].transform("max")
-    stuck = (trials[rate] < STUCK_RATE) & (best >= SOLVED_RATE)
-    in_question = best >= SOLVED_RATE
-    by_gear = trials.groupby("gear", observed=True)[rate].mean()
+    cells, solvable = cell_rates(trials), of_solved_cells(trials)
+    by_gear = trials.groupby("gear", observed=True)[RATE].mean()
     return {
-        "cells": int(cells.ngroups),
-        "cells_solved_by_one_trial_or_more": int((cells[rate].max() >= SOLVED_RATE).sum()),
-        "trials_stuck_in_solved_cells": int(stuck.sum()),
-        "trials_in_solved_cells": int(in_question.sum()),
+        "cells": trials.groupby(schema.cell_columns(trials), observed=True).ngroups,
+        "cells_solved_by_one_trial_or_more": int(solved(cells["rate_best_norm"]).sum()),
+        "trials_stuck_in_solved_cells": int(stuck(solvable[RATE]).sum()),
+        "trials_in_solved_cells": len(solvable),
         "landing_rate_mean": {str(gear): round(float(value), 4) for gear, value in by_gear.items()},
     }

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
-from ivl.experiment import POLICY
+from ivl.layout import EMPTY, Layout, layout_of
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.sweep import schema
 from ivl.sweep.config import PolicyMap, Sweep
@@ -29,7 +29,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 def trials_table(sweep: Sweep, gear: str, log: Log) -> pa.Table:
     """One row per trial."""
-    every = np.arange(len(log.trials))
+    every, layout = np.arange(len(log.trials)), layout_of(sweep)
     last = log.n_episodes - 1
     four, spotless = landed(log)
     recent = log.recent[:, :, None] & log.scored
@@ -46,10 +46,11 @@ def trials_table(sweep: Sweep, gear: str, log: Log) -> pa.Table:
         "landing_rate_clean_norm": share(spotless, recent),
         "n_recent": recent.sum(axis=(1, 2)),
         "reward_mean": mean(log.reward, recent),
-        **_policy("mu0", log.mu0),
-        **_policy("mu", log.mu[every, last]),
-        **_policy("sigma", log.sigma[every, last]),
-        **_policy("recommended", log.recommended[every, last]),
+        **{name: mean(log.terms[term], recent) for term, name in layout.term_columns("reward_mean").items()},
+        **_policy(layout, "mu0", log.mu0),
+        **_policy(layout, "mu", log.mu[every, last]),
+        **_policy(layout, "sigma", log.sigma[every, last]),
+        **_policy(layout, "recommended", log.recommended[every, last]),
         "n_check": np.full(len(every), log.check.shape[1]),
         "check_rate_four_leg_norm": _rate(four_leg(log.check)),
         "check_rate_clean_norm": _rate(clean(log.check)),
@@ -57,13 +58,14 @@ def trials_table(sweep: Sweep, gear: str, log: Log) -> pa.Table:
         "n_body_contacts": (log.scored & (log.outcomes["body_contact"] != 0)).sum(axis=(1, 2)),
         **_at_trigger(log.outcomes, recent),
         **contact_columns(log.outcomes, recent, axis=(1, 2)),
-        **_best(sweep, log),
+        **_best(sweep, layout, log),
     }
-    return make_table(schema.TRIALS, columns)
+    return make_table(schema.TRIALS, columns, layout)
 
 
 def episodes_table(sweep: Sweep, gear: str, log: Log) -> pa.Table:
     """One row per trial and episode flown."""
+    layout = layout_of(sweep)
     trial, episode = np.nonzero(log.flown)
     four, spotless = landed(log)
     scored = log.scored[trial, episode]
@@ -71,37 +73,41 @@ def episodes_table(sweep: Sweep, gear: str, log: Log) -> pa.Table:
         **_key(sweep, gear, [log.trials[i] for i in trial.tolist()]),
         "episode": episode,
         "n_scored": scored.sum(axis=1),
-        **_policy("mu", log.mu[trial, episode]),
-        **_policy("sigma", log.sigma[trial, episode]),
-        **_policy("recommended", log.recommended[trial, episode]),
+        **_policy(layout, "mu", log.mu[trial, episode]),
+        **_policy(layout, "sigma", log.sigma[trial, episode]),
+        **_policy(layout, "recommended", log.recommended[trial, episode]),
         "reward_mean": mean(log.reward[trial, episode], scored, axis=1),
+        **{
+            name: mean(log.terms[term][trial, episode], scored, axis=1)
+            for term, name in layout.term_columns("reward_mean").items()
+        },
         "landing_rate_four_leg_norm": share(four[trial, episode], scored, axis=1),
         "landing_rate_clean_norm": share(spotless[trial, episode], scored, axis=1),
     }
-    return make_table(schema.EPISODES, columns)
+    return make_table(schema.EPISODES, columns, layout)
 
 
 def rollouts_table(sweep: Sweep, gear: str, log: Log) -> pa.Table:
     """One row per rollout of the trials; those that only check recommendations are not among them."""
+    layout = layout_of(sweep)
     flown = np.broadcast_to(log.flown[:, :, None], log.scored.shape)
     trial, episode, idx = np.nonzero(flown)
     outcomes = log.outcomes[trial, episode, idx]
-    theta = log.theta[trial, episode, idx]
     columns: Columns = {
         **_key(sweep, gear, [log.trials[i] for i in trial.tolist()]),
         "episode": episode,
         "idx": idx,
         "seed": log.world_seed[trial],
         "stream": episode * sweep.n_rollouts + idx,
-        "rrev_c_per_s": theta[:, 0],
-        "moment_y_Nmm": theta[:, 1],
+        **_policy(layout, "", log.theta[trial, episode, idx]),
         "scored": log.scored[trial, episode, idx],
         "reward": log.reward[trial, episode, idx],
+        **{name: log.terms[term][trial, episode, idx] for term, name in layout.term_columns().items()},
     }
     for column, (name, element) in schema.outcome_columns().items():
         values = outcomes[name]
         columns[column] = values if values.ndim == 1 else values[:, element]
-    return make_table(schema.ROLLOUTS, columns)
+    return make_table(schema.ROLLOUTS, columns, layout)
 
 
 def failures_table(
@@ -144,9 +150,9 @@ def encode(table: pa.Table) -> bytes:
     return bytes(sink.getvalue())
 
 
-def make_table(kind: str, columns: Mapping[str, Any]) -> pa.Table:
+def make_table(kind: str, columns: Mapping[str, Any], layout: Layout = EMPTY) -> pa.Table:
     """Columns by name as a table of one kind; every column of the schema, and no other, must be given."""
-    wanted = schema.schema(kind)
+    wanted = schema.schema(kind, layout)
     if set(columns) != set(wanted.names):
         raise ValueError(f"{kind}: columns {sorted(set(columns) ^ set(wanted.names))} are missing or unknown")
     arrays = [_array(columns[field.name], field.type) for field in wanted]
@@ -172,8 +178,8 @@ def _key(grid: Sweep | PolicyMap, gear: str, trials: Sequence[Trial]) -> Columns
     }
 
 
-def _policy(prefix: str, theta: npt.NDArray[np.float64]) -> Columns:
-    return {f"{prefix}_{name}": theta[..., i] for i, name in enumerate(POLICY)}
+def _policy(layout: Layout, prefix: str, theta: npt.NDArray[np.float64]) -> Columns:
+    return {name: theta[..., i] for i, name in enumerate(layout.policy_columns(prefix))}
 
 
 def _at_trigger(outcomes: Outcomes, counted: BoolArray) -> Columns:
@@ -182,7 +188,7 @@ def _at_trigger(outcomes: Outcomes, counted: BoolArray) -> Columns:
     return {"n_triggered": triggered.sum(axis=(1, 2)), **means}
 
 
-def _best(sweep: Sweep, log: Log) -> Columns:
+def _best(sweep: Sweep, layout: Layout, log: Log) -> Columns:
     """The rollout of each trial with the largest return; its first one if none was scored."""
     every = np.arange(len(log.trials))
     flat = np.where(log.scored, log.reward, -np.inf).reshape(len(every), -1).argmax(axis=1)
@@ -191,7 +197,7 @@ def _best(sweep: Sweep, log: Log) -> Columns:
     return {
         "best_episode": episode,
         "best_stream": episode * sweep.n_rollouts + idx,
-        **_policy("best", log.theta[every, episode, idx]),
+        **_policy(layout, "best", log.theta[every, episode, idx]),
         "best_reward": log.reward[every, episode, idx],
         "best_n_legs": outcomes["n_legs"],
         "best_body_contact": outcomes["body_contact"],

@@ -16,8 +16,9 @@ from ivl.flight.log import Format, Given, Log, with_rules
 from ivl.flight.phases import plane, trigger
 from ivl.flight.store import Flight, make_flight
 from ivl.flight.table import Rule
+from ivl.learning.recorder import SCORED, RolloutRows
 from ivl.seeds import Purpose, derive
-from ivl.store import SCORED, RolloutRows, RunStore
+from ivl.store import RunStore
 
 JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
 
@@ -110,7 +111,8 @@ def _database(folder: Path) -> dict[str, dict[str, Any]]:
         for i in range(len(rows)):
             label = f"ep{rows.episode[i]}-run{rows.idx[i]}"
             label = f"trial{trial}-{label}" if n_trials else label
-            result[f"{seed:016x}-{rows.stream[i]}"] = {"label": label, **site, **_rollout(experiment.policy.shape, rows, i)}
+            told = _rollout(experiment.policy.shape, rows, i)
+            result[f"{seed:016x}-{rows.stream[i]}"] = {"label": label, **site, **told}
     return result
 
 

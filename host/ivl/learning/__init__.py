@@ -1,0 +1,1 @@
+"""Learning: the loop, and what it asks of whoever records it."""

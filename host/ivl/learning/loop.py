@@ -1,0 +1,168 @@
+"""The learning loop: ask, fly, score, tell, for one trial or for many in lock-step.
+
+A trial is an experiment. It gives the same policies, the same rollouts, the same bits, whether it runs alone, beside
+others, or in two halves with a `kill -9` between them, and whatever records it: every episode is read back from the
+recorder before the learners are told.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ivl.experiment import Experiment
+from ivl.learners import Learner
+from ivl.learners.base import LANDED, FloatArray
+from ivl.learning.recorder import PLANNED, SCORED, EpisodeRow, Recorder, RolloutRows
+from ivl.outcome import RECENT_EPISODES, BoolArray, clean, four_leg
+from ivl.seeds import Purpose, derive
+from ivl.source import Plan, RolloutSource
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run stands after an episode.
+
+    Attributes:
+        episode: Episodes done.
+        n_episodes: Episodes that the budget pays for.
+        rows: This episode's row of each trial that took part.
+        rate_recent: Four-leg rate over the last three episodes, all trials.
+        n_flown: Rollouts flown by this process.
+        rollouts_per_s: Of this process so far, learning and storing included.
+    """
+
+    episode: int
+    n_episodes: int
+    rows: list[EpisodeRow]
+    rate_recent: float
+    n_flown: int
+    rollouts_per_s: float
+
+
+def trials_of(experiment: Experiment, n_trials: int = 1) -> list[Experiment]:
+    """Trials of one experiment: trial t is the experiment with its seed + t."""
+    return [experiment.model_copy(update={"seed": experiment.seed + trial}) for trial in range(n_trials)]
+
+
+class LearningRun:
+    """Trials that are advanced in lock-step through one source and one recorder."""
+
+    def __init__(self, trials: Sequence[Experiment], source: RolloutSource, recorder: Recorder) -> None:
+        """Start, or continue where the recorder stands.
+
+        Args:
+            trials: What each trial is; they have budget, episodes and reward in common.
+            source: Where their rollouts come from.
+            recorder: Keeps what they do.
+        """
+        self._first, self._source, self._recorder = trials[0], source, recorder
+        self._world_seed = np.array([derive(trial.seed, Purpose.WORLD) for trial in trials], dtype=np.uint64)
+        self._learners = [trial.make_learner(derive(trial.seed, Purpose.LEARNER)) for trial in trials]
+        for number, state in recorder.learner_states().items():
+            self._learners[number].load_state_dict(state)
+        self._history: list[EpisodeRow] = recorder.episodes()
+        self._n_flown = 0
+
+    def run(self, on_episode: Callable[[Progress], None] | None = None) -> None:
+        """Fly the rest of the budget; after each stored episode call `on_episode`.
+
+        Raises:
+            RolloutError: The source failed; the run can be resumed.
+            StoreError: A commit failed; the run can be resumed.
+        """
+        began, n_episodes = time.monotonic(), self._first.n_episodes
+        first = max((row.episode + 1 for row in self._history), default=0)
+        stopped = {row.trial for row in self._history if row.stopped}
+        active = [trial for trial in range(len(self._learners)) if trial not in stopped]
+        for episode in range(first, n_episodes):
+            if not active:
+                return
+            rows = self._fly_episode(episode, active)
+            active = [row.trial for row in rows if not row.stopped]
+            if on_episode:
+                self._history.extend(rows)
+                rate = self._n_flown / max(time.monotonic() - began, 1e-9)
+                on_episode(Progress(episode + 1, n_episodes, rows, recent_rate(self._history), self._n_flown, rate))
+
+    def _fly_episode(self, episode: int, active: list[int]) -> list[EpisodeRow]:
+        rollouts = self._recorder.rollouts(episode=episode)
+        if not len(rollouts):
+            self._plan(episode, active)
+            rollouts = self._recorder.rollouts(episode=episode)
+        if (rollouts.status == PLANNED).any():
+            self._fly(episode, rollouts)
+            rollouts = self._recorder.rollouts(episode=episode)
+        return self._tell(episode, active, rollouts)
+
+    def _plan(self, episode: int, active: list[int]) -> None:
+        n = self._first.n_rollouts
+        theta = [self._learners[trial].ask() for trial in active]
+        stream = np.arange(episode * n, (episode + 1) * n, dtype=np.uint64)
+        self._recorder.plan(episode, active, stream, theta, self._states(active))
+
+    def _fly(self, episode: int, rollouts: RolloutRows) -> None:
+        """Fly what is still planned and record each portion as it comes."""
+        still = np.flatnonzero(rollouts.status == PLANNED)
+        trial = rollouts.trial[still]
+        plan = Plan(rollouts.theta[still], self._world_seed[trial], rollouts.stream[still], trial)
+        for flown in self._source.fly(plan):
+            rows = still[flown.index]
+            terms = self._first.reward.score(flown.outcomes)
+            self._recorder.score(
+                episode, rollouts.trial[rows], rollouts.idx[rows], flown.outcomes, terms, flown.discarded
+            )
+            self._n_flown += len(rows)
+
+    def _tell(self, episode: int, active: list[int], rollouts: RolloutRows) -> list[EpisodeRow]:
+        scored, four, spotless = rollouts.status == SCORED, four_leg(rollouts.outcomes), clean(rollouts.outcomes)
+        rows = []
+        for trial in active:
+            chosen = (rollouts.trial == trial) & scored
+            outcomes, learner = rollouts.outcomes[chosen], self._learners[trial]
+            meta = {name: outcomes[name] for name in outcomes.dtype.names or ()} | {LANDED: four[chosen]}
+            learner.tell(rollouts.theta[chosen], rollouts.reward[chosen], meta)
+            rows.append(_episode_row(trial, episode, learner, rollouts.reward[chosen], four[chosen], spotless[chosen]))
+        self._recorder.finish_episode(rows, self._states(active))
+        return rows
+
+    def _states(self, trials: Iterable[int]) -> Iterator[dict[str, Any]]:
+        return (self._learners[trial].state_dict() for trial in trials)
+
+
+def recent_rate(history: list[EpisodeRow], trial: int | None = None, clean_only: bool = False) -> float:
+    """Landing rate over the last three episodes of each trial (or of one), four-leg or clean; NaN without rollouts."""
+    last = {row.trial: row.episode for row in history}
+    recent = [
+        row
+        for row in history
+        if row.episode > last[row.trial] - RECENT_EPISODES and trial in (None, row.trial) and row.n_scored
+    ]
+    n_scored = sum(row.n_scored for row in recent)
+    landed = sum((row.rate_clean if clean_only else row.rate_four_leg) * row.n_scored for row in recent)
+    return landed / n_scored if n_scored else float("nan")
+
+
+def _episode_row(
+    trial: int, episode: int, learner: Learner, reward: FloatArray, four: BoolArray, spotless: BoolArray
+) -> EpisodeRow:
+    result = learner.result
+    return EpisodeRow(
+        trial=trial,
+        episode=episode,
+        n_scored=reward.size,
+        mu=tuple(result.mu.tolist()),
+        sigma=tuple(result.sigma.tolist()),
+        recommended=tuple(result.recommended.tolist()),
+        reward_mean=_mean(reward),
+        rate_four_leg=_mean(four),
+        rate_clean=_mean(spotless),
+        stopped=learner.stop(),
+    )
+
+
+def _mean(values: FloatArray | BoolArray) -> float:
+    """As `numpy.mean`, which is slow for a handful of numbers; NaN of none."""
+    return float(np.add.reduce(values, dtype=np.float64) / values.size) if values.size else float("nan")
