@@ -39,8 +39,11 @@ class LandingSpec(Task):
     @model_validator(mode="before")
     @classmethod
     def _with_units(cls, data: Any) -> Any:
-        """A parameter of the world may be a number alone, as after `--set`."""
-        overrides = data.get("overrides") if isinstance(data, dict) else None
+        """Parameters of the policy may stand under their names; one of the world may be a number alone."""
+        if not isinstance(data, dict):
+            return data
+        data = _in_order(data)
+        overrides = data.get("overrides")
         if not isinstance(overrides, dict):
             return data
         plain = {name: value for name, value in overrides.items() if isinstance(value, (int, float))}
@@ -64,6 +67,15 @@ class LandingSpec(Task):
             period_s=period_s,
         )
         return world, trace
+
+
+def _in_order(data: dict[str, Any]) -> dict[str, Any]:
+    """The data with `theta` in place of parameters under their names; what is wrong with them is left to be found."""
+    form = forms.forms().get(str(data.get("form", forms.PAPER)))
+    names = form.names if form else ()
+    if "theta" in data or not all(name in data for name in names):
+        return data
+    return {**{name: v for name, v in data.items() if name not in names}, "theta": [data[name] for name in names]}
 
 
 def load(path: Path) -> LandingSpec:

@@ -9,6 +9,7 @@ on one thread or many.
 """
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -195,6 +196,7 @@ class World:
         threads: int | None = None,
         stream: npt.ArrayLike | None = None,
         state: State | None = None,
+        **named: FloatLike,
     ) -> np.recarray[Any, Any]:
         """Fly one rollout for each element of the broadcast of the arguments.
 
@@ -203,6 +205,7 @@ class World:
             angle_deg: Approach angle above the horizontal, degrees.
             *theta: The policy: one argument for each parameter of its form, in the form's order and units. For the
                 paper's form: trigger threshold RREV_c (1/s), nose-up moment M_yd (N mm).
+            **named: Parameters that follow those of `theta`, by the names that the form gives them.
             form: Form of the policy.
             seed: Seed of the random numbers, 0 .. 2^64 - 1.
             start: "imparted" (at the approach velocity), "flown" (from hover), "at_trigger" (moment commanded at
@@ -219,7 +222,7 @@ class World:
             ArgumentError: An argument is not finite, out of range, or does not broadcast.
         """
         specs, shape = self._specs(
-            start, stream, state, form, theta, speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
+            start, stream, state, form, theta, named, speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         n_threads = _check_threads(threads)
         outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
@@ -240,10 +243,11 @@ class World:
         stream: int = 0,
         period_s: float = 0.002,
         state: State | None = None,
+        **named: float,
     ) -> Trace:
         """Fly one rollout and record it every `period_s` seconds (arguments and errors as `rollouts`, scalars only)."""
         specs, shape = self._specs(
-            start, stream, state, form, theta, speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
+            start, stream, state, form, theta, named, speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         if shape != ():
             raise ArgumentError(f"trace: the arguments must be scalars, they broadcast to {shape}")
@@ -315,6 +319,7 @@ class World:
         state: State | None,
         form_name: str,
         theta: tuple[npt.ArrayLike, ...],
+        named: Mapping[str, npt.ArrayLike],
         **arguments: npt.ArrayLike | None,
     ) -> tuple[npt.NDArray[np.void], tuple[int, ...]]:
         """Checked, broadcast and flattened rollout specifications, and the shape they had."""
@@ -330,7 +335,7 @@ class World:
             given["stream"] = _numbers("stream", stream)
         given |= state.fields() if state is not None else {}
         form = forms.by_name(form_name)
-        given["theta"] = self._theta(form, theta)
+        given["theta"] = self._theta(form, theta, named)
         vectors = {n for n in given if n in self._library.spec_fields and self._library.spec_fields[n].count > 1}
         shapes = {name: array.shape[:-1] if name in vectors else array.shape for name, array in given.items()}
         try:
@@ -347,21 +352,25 @@ class World:
             specs[name] = np.broadcast_to(array, whole).reshape(specs[name].shape)
         return specs, shape
 
-    def _theta(self, form: forms.Form, theta: tuple[npt.ArrayLike, ...]) -> FloatArray:
+    def _theta(
+        self, form: forms.Form, theta: tuple[npt.ArrayLike, ...], named: Mapping[str, npt.ArrayLike]
+    ) -> FloatArray:
         """Parameters in SI units with zeros behind them, shape (..., 64)."""
-        if len(theta) != form.n:
+        rest = form.names[len(theta) :]
+        if len(theta) > form.n or set(named) != set(rest):
+            given = ", ".join([f"{len(theta)} in order", *named])
             raise ArgumentError(
-                f"a policy of the form {form.name} has {form.n} parameters ({', '.join(form.names)}), "
-                f"{len(theta)} are given"
+                f"a policy of the form {form.name} has the parameters {', '.join(form.names)}; given are {given}"
             )
-        columns = [_numbers(name, value) for name, value in zip(form.names, theta, strict=True)]
+        values = [*theta, *(named[name] for name in rest)]
+        columns = [_numbers(name, value) for name, value in zip(form.names, values, strict=True)]
         try:
-            values = form.to_si(np.stack(np.broadcast_arrays(*columns), axis=-1))
+            stacked = np.stack(np.broadcast_arrays(*columns), axis=-1)
         except ValueError as error:
             shapes = ", ".join(f"{name} {column.shape}" for name, column in zip(form.names, columns, strict=True))
             raise ArgumentError(f"the arguments do not broadcast: {shapes}") from error
-        padded = np.zeros((*values.shape[:-1], self._library.spec_fields["theta"].count))
-        padded[..., : form.n] = values
+        padded = np.zeros((*stacked.shape[:-1], self._library.spec_fields["theta"].count))
+        padded[..., : form.n] = form.to_si(stacked)
         return padded
 
     def _check_range(self, name: str, array: npt.NDArray[Any]) -> None:

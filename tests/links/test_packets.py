@@ -15,7 +15,10 @@ from ivl.links.packets import PacketType, Phase, Request, Status, decode, encode
 
 CORE = Path(__file__).parents[2] / "firmware" / "core"
 VALUES = {
-    PacketType.POLICY: {"seq": 4_000_000_001, "rrev_c_per_s": 4.8, "moment_y_Nm": 0.00815},
+    PacketType.POLICY: {
+        "seq": 4_000_000_001, "crc": 3_000_000_001, "form": 1, "n": 6, "part": 1,
+        "theta0": 4.8, "theta1": 0.00815, "theta2": -1.0, "theta3": 0.0,
+    },  # fmt: skip
     PacketType.COMMAND: {
         "seq": 65535, "request": 2, "hover_x_m": -0.25, "hover_y_m": 1.5, "hover_z_m": 0.7, "speed_mps": 2.2,
         "angle_rad": math.radians(60.3),

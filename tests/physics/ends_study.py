@@ -124,7 +124,8 @@ class Vehicle:
         start = names[int(spec["start"])]
         distance = f", d_ceil_m={float(spec['d_ceil_m'])!r}" if start == "at_trigger" else ""
         numbers = ", ".join(
-            repr(float(spec[name])) for name in ("speed_mps", "angle_deg", "rrev_c_per_s", "moment_y_Nmm")
+            repr(float(value))
+            for value in (spec["speed_mps"], spec["angle_deg"], spec["theta"][0], 1e3 * spec["theta"][1])
         )
         return (
             f"ivl.World({self.base!r}, {self.gear!r}, {self.gear_set!r}, {self.sensing!r}, **{self.overrides!r})"
@@ -274,8 +275,8 @@ def draw_specs(vehicle: Vehicle, seed: int) -> Specs:
     specs = native.library().default_specs(n)
     specs["speed_mps"] = rng.uniform(*SPEED_MPS, n)
     specs["angle_deg"] = rng.uniform(*ANGLE_DEG, n)
-    specs["rrev_c_per_s"] = rng.uniform(*RREV_C_PER_S, n)
-    specs["moment_y_Nmm"] = rng.uniform(0.0, moment_max, n)
+    specs["theta"][:, 0] = rng.uniform(*RREV_C_PER_S, n)
+    specs["theta"][:, 1] = 1e-3 * rng.uniform(0.0, moment_max, n)
     specs["d_ceil_m"] = rng.uniform(*D_CEIL_M, n)
     specs["start"] = rng.choice(list(START_CODES.values()), n)
     _draw_states(vehicle, specs, rng)

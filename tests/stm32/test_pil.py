@@ -57,7 +57,7 @@ def test_each_thread_has_a_chip_and_bits_do_not_depend_on_their_number() -> None
 
 
 def test_policy_that_the_core_refuses_is_refused_by_the_chip(chips: pil.Chips) -> None:
-    strict = {"firmware.moment_y_max": 0.005}
+    strict = {"firmware.flip_moment_max": 0.005}
     here, there = (ivl.World(**strict) for _ in range(2))
     chips.attach(there)
     found = there.rollouts(2.5, 90.0, 4.8, [4.0, 8.0])
@@ -168,8 +168,10 @@ def small_pil(tmp_path: Path) -> Path:
     check = {
         "n_fresh": 10,
         "effort": 0.01,
-        "rrev_c_per_s": {"lo": 4.5, "hi": 5.0, "step": 0.25},
-        "moment_y_Nmm": {"lo": 7.0, "hi": 9.0, "step": 1.0},
+        "grid": {
+            "rrev_c_per_s": {"lo": 4.5, "hi": 5.0, "step": 0.25},
+            "moment_y_Nmm": {"lo": 7.0, "hi": 9.0, "step": 1.0},
+        },
     }
     data = yaml.safe_load(experiment.load(EXPERIMENT, ["budget=16"], learner="ephe_robust").to_yaml()) | {
         "check": check

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ivl import forms
 from ivl.can.dbc import FILE, Codec, RangeError
 from ivl.can.link import BusError, CanLink, State
 from ivl.can.telemetry import Observer, Telemetry
@@ -30,8 +31,8 @@ def test_state_frame_bytes_by_hand() -> None:
 
 
 def test_policy_frame_holds_the_vehicles_own_float() -> None:
-    frame = Codec(5).encode("POLICY_RREV", {"seq": 2**32 - 1, "rrev_c": 4.8})
-    assert (frame.arbitration_id, bytes(frame.data)) == (0x125, struct.pack("<If", 2**32 - 1, 4.8))
+    frame = Codec(5).encode("POLICY_PARAM", {"form": 1, "number": 2, "value": 4.8})
+    assert (frame.arbitration_id, bytes(frame.data)) == (0x135, struct.pack("<BBxxf", 1, 2, 4.8))
 
 
 def test_cantools_alone_reads_the_frames() -> None:
@@ -42,17 +43,15 @@ def test_cantools_alone_reads_the_frames() -> None:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("signal", "value"), [("rrev_c", math.nan), ("rrev_c", math.inf), ("rrev_c", 20.1), ("seq", -1)]
-)
+@pytest.mark.parametrize(("signal", "value"), [("value", math.nan), ("value", math.inf), ("number", 64), ("form", -1)])
 def test_value_out_of_range_is_refused_with_its_name(signal: str, value: float) -> None:
-    with pytest.raises(RangeError, match=rf"POLICY_RREV\.{signal}: value .*allowed 0 \.\. "):
-        Codec(0).encode("POLICY_RREV", {"seq": 1, "rrev_c": 4.8, signal: value})
+    with pytest.raises(RangeError, match=rf"POLICY_PARAM\.{signal}: value .*allowed "):
+        Codec(0).encode("POLICY_PARAM", {"form": 0, "number": 1, "value": 4.8, signal: value})
 
 
 def test_value_that_is_needed_cannot_be_unknown() -> None:
-    with pytest.raises(RangeError, match=r"POLICY_MOMENT\.moment: a value is needed"):
-        Codec(0).encode("POLICY_MOMENT", {"seq": 1, "moment": None})
+    with pytest.raises(RangeError, match=r"POLICY_PARAM\.value: a value is needed"):
+        Codec(0).encode("POLICY_PARAM", {"form": 0, "number": 1, "value": None})
 
 
 @given(z=st.floats(-32.767, 32.767), vz=st.floats(-32.767, 32.767), vbat=st.floats(0, 65.534), phase=st.integers(0, 7))
@@ -123,14 +122,30 @@ def test_blocks_end_with_reset_and_delete() -> None:
 
 
 def test_policy_of_an_echo_is_told_once() -> None:
-    telemetry = Telemetry(Codec(0))
+    telemetry, form = Telemetry(Codec(0)), forms.by_name("constant")
+    crc = form.crc([4.5, 7.8125])
+    for part in packets.encode_policy(9, form, [4.5, 7.8125]):
+        assert telemetry.observer.from_host(b"\xd2" + part) == []
     echo = packets.encode(
-        packets.PacketType.POLICY_ECHO, seq=9, status=0, seq_in_force=9, rrev_c_per_s=4.5, moment_y_Nm=0.0078125
+        packets.PacketType.POLICY_ECHO, seq=9, status=0, missing=0, seq_in_force=9, crc_in_force=crc, form_in_force=0
     )
     assert telemetry.observer.from_vehicle(b"\xd2" + echo, 0.0)
     told = [Codec(0).decode(frame) for frame in telemetry.frames(0.0)]
-    assert told == [("POLICY_RREV", {"seq": 9, "rrev_c": 4.5}), ("POLICY_MOMENT", {"seq": 9, "moment": 0.0078125})]
+    assert told == [
+        ("POLICY", {"seq": 9, "crc": crc}),
+        ("POLICY_PARAM", {"form": 0, "number": 0, "value": 4.5}),
+        ("POLICY_PARAM", {"form": 0, "number": 1, "value": 0.0078125}),
+    ]
     assert telemetry.frames(0.0) == []
+
+
+def test_policy_whose_parameters_nobody_heard_is_told_by_its_number() -> None:
+    telemetry = Telemetry(Codec(0))
+    echo = packets.encode(
+        packets.PacketType.POLICY_ECHO, seq=9, status=0, missing=0, seq_in_force=8, crc_in_force=77, form_in_force=0
+    )
+    assert telemetry.observer.from_vehicle(b"\xd2" + echo, 0.0)
+    assert [Codec(0).decode(frame) for frame in telemetry.frames(0.0)] == [("POLICY", {"seq": 8, "crc": 77})]
 
 
 @settings(max_examples=100)

@@ -42,4 +42,4 @@ def test_print_dbc_is_a_dbc(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["can-gateway", "--print-dbc", "--node", "3"]) == 0
     database = cantools.database.load_string(capsys.readouterr().out)
     assert database.get_message_by_name("HEARTBEAT_HOST").frame_id == 0x703
-    assert database.get_message_by_name("POLICY_RREV").get_signal_by_name("rrev_c").is_float
+    assert database.get_message_by_name("POLICY_PARAM").get_signal_by_name("value").is_float
