@@ -56,7 +56,7 @@ void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group)
     ivl_sim_world_rest_legs(model, &resting);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        // an empty lane is computed along with the others: it must hold numbers
+        // an empty lane is computed along with the others: it must hold numbers, and be away from the surface
         ivl_sim_lane_set(&group->state, lane, &resting);
         ivl_sim_contact_set(model, &group->contact, lane, free_feet);
         group->load.surface_height_m[lane] = ivl_sim_surface_height_of(&model->surface, ivl_d3_load(resting.p_WB_m)) + 2.0 * model->reach_m;
