@@ -148,6 +148,8 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
     model->raw = *raw;
     model->firmware = *firmware;
     model->core = ivl_sim_core_linked;
+    model->surface = ivl_sim_surface_level(raw->world_ceiling_height_m);
+    model->up_W = ivl_d3(0.0, 0.0, 1.0);
     derive_legs(model);
     derive_plate(&model->plate[IVL_SIM_PROP_PLATE], raw->prop_plate_size_x_m, raw->prop_plate_size_y_m, raw->prop_plate_size_z_m,
                  raw->prop_plate_center_z_m);

@@ -1,7 +1,7 @@
 /// @file sim_model.h
 /// The constant side of the world: raw parameters, and everything that follows from them, computed here and only here.
 ///
-/// Frames: W world, z up, ceiling at z = ceiling_height; B body, x forward, y left, z up.  Legs and motors are numbered
+/// Frames: W world, z up unless the model says otherwise; B body, x forward, y left, z up.  Legs and motors are numbered
 /// 1 front-right, 2 rear-right, 3 rear-left, 4 front-left; index 0..3.  SI, radians.
 #ifndef IVL_SIM_MODEL_H
 #define IVL_SIM_MODEL_H
@@ -11,6 +11,7 @@
 
 #include "ivl.h"
 #include "phys_math.h"
+#include "phys_surface.h"
 #include "sim_core.h"
 #include "sim_params.h"
 
@@ -76,6 +77,8 @@ typedef struct
     ivl_sim_params_t    raw;
     ivl_sim_leg_model_t leg;
     ivl_sim_plate_t     plate[IVL_SIM_PLATES];
+    ivl_sim_surface_t   surface;  ///< to land on; of `raw` a ceiling at rest
+    ivl_d3_t            up_W;     ///< unit vector against gravity, whose strength is raw.world_gravity_mps2; of `raw` z
     double rotor_x_m[IVL_SIM_MOTORS], rotor_y_m[IVL_SIM_MOTORS], rotor_spin[IVL_SIM_MOTORS];  ///< spin: sign of the torque on B
     double mass_total_kg;
     double rotor_speed_max_radps;

@@ -222,7 +222,8 @@ class World:
             ArgumentError: An argument is not finite, out of range, or does not broadcast.
         """
         specs, shape = self._specs(
-            start, stream, state, form, theta, named, speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
+            start, stream, state, form, theta, named,
+            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         n_threads = _check_threads(threads)
         outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
@@ -247,7 +248,8 @@ class World:
     ) -> Trace:
         """Fly one rollout and record it every `period_s` seconds (arguments and errors as `rollouts`, scalars only)."""
         specs, shape = self._specs(
-            start, stream, state, form, theta, named, speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
+            start, stream, state, form, theta, named,
+            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         if shape != ():
             raise ArgumentError(f"trace: the arguments must be scalars, they broadcast to {shape}")
@@ -341,8 +343,8 @@ class World:
         try:
             shape = np.broadcast_shapes(*shapes.values())
         except ValueError as error:
-            named = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
-            raise ArgumentError(f"the arguments do not broadcast: {named}") from error
+            told = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
+            raise ArgumentError(f"the arguments do not broadcast: {told}") from error
         specs = self._library.default_specs(int(np.prod(shape, dtype=np.int64)))
         specs["start"], specs["form"] = START_CODES[start], form.number
         specs["stream"] = np.arange(specs.size, dtype=np.uint64)

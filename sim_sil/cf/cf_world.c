@@ -86,7 +86,7 @@ static void rest(ivl_cf_t *cf)
     ivl_sim_world_t    *w = ivl_cf_world(cf);
     const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
     const ivl_rot_t     R = ivl_rot_from_quat(kin.q_WB);
-    ivl_sim_airflow_t   body = {.height_m = kin.p_WB_m[2]};  // at rest
+    ivl_sim_airflow_t   body = {.gap_m = ivl_sim_world_gap_m(&cf->group, IVL_CF_LANE)};  // at rest
     memcpy(body.q_WB, kin.q_WB, sizeof body.q_WB);
     const ivl_sim_thrust_t load = ivl_sim_rotor_step(&cf->model, &w->rotor, &body, cf->model.tick_s);
     w->left_s = 0.0;

@@ -2,7 +2,7 @@
 
 #include "phys_plates.h"
 
-double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
+double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, double surface_height_m)
 {
     const ivl_sim_params_t    *raw = &model->raw;
     const ivl_sim_leg_model_t *leg = &model->leg;
@@ -10,11 +10,13 @@ double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
     phys_posture_t             k;
     ivl_sim_lane_spread(&s, kin);
     phys_posture(model, &s, &k);
-    const ivl_d3_t v = ivl_w3_lane(&k.v, 0), w = ivl_w3_lane(&k.w, 0), up = ivl_w3_lane(&k.up, 0);
+    const ivl_d3_t v = ivl_w3_lane(&k.v, 0), w = ivl_w3_lane(&k.w, 0), up = ivl_w3_lane(&k.up, 0), normal = ivl_w3_lane(&k.normal, 0);
+    const double   level_m = ivl_d3_dot(model->up_W, ivl_d3_load(kin->p_WB_m));
+    const double   height_m = ivl_sim_surface_height_of(&model->surface, ivl_d3_load(kin->p_WB_m));
     double         energy =
         0.5 * raw->body_mass_kg * ivl_d3_dot(v, v) +
         0.5 * (raw->body_inertia_xx_kgm2 * w.x * w.x + raw->body_inertia_yy_kgm2 * w.y * w.y + raw->body_inertia_zz_kgm2 * w.z * w.z) +
-        raw->body_mass_kg * raw->world_gravity_mps2 * kin->p_WB_m[2];
+        raw->body_mass_kg * raw->world_gravity_mps2 * level_m;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         ivl_angle_t folded[2];
@@ -23,14 +25,15 @@ double ivl_sim_energy(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
         ivl_wide_unfold(folded, t, deflection, 2);
         const ivl_d3_t v_hip = ivl_d3_add(v, ivl_d3_cross(w, leg->hip_B_m[i]));
         const ivl_d3_t v_foot = ivl_d3_add(v_hip, ivl_w3_lane(&k.v_rod[i], 0));
-        const double   hip_height = kin->p_WB_m[2] + ivl_d3_dot(leg->hip_B_m[i], up);
+        const double   hip_level = level_m + ivl_d3_dot(leg->hip_B_m[i], up);
+        const double   foot_level = ivl_d3_dot(model->up_W, ivl_d3_load(kin->p_foot_W_m[i]));
         energy += 0.5 * leg->mass_hip_kg * ivl_d3_dot(v_hip, v_hip) + leg->mass_cross_kg * ivl_d3_dot(v_hip, v_foot) +
                   0.5 * leg->mass_foot_kg * ivl_d3_dot(v_foot, v_foot) +
                   0.5 * raw->leg_stiffness_Nmprad * (deflection[0][0] * deflection[0][0] + deflection[1][0] * deflection[1][0]) +
-                  raw->world_gravity_mps2 * (leg->weight_hip_kg * hip_height + leg->weight_foot_kg * kin->p_foot_W_m[i][2]);
+                  raw->world_gravity_mps2 * (leg->weight_hip_kg * hip_level + leg->weight_foot_kg * foot_level);
     }
-    return energy + ivl_sim_plate_energy(model, &model->plate[IVL_SIM_PROP_PLATE], up, kin->p_WB_m[2]) +
-           ivl_sim_plate_energy(model, &model->plate[IVL_SIM_BASE_PLATE], up, kin->p_WB_m[2]);
+    return energy + ivl_sim_plate_energy(model, &model->plate[IVL_SIM_PROP_PLATE], normal, height_m, surface_height_m) +
+           ivl_sim_plate_energy(model, &model->plate[IVL_SIM_BASE_PLATE], normal, height_m, surface_height_m);
 }
 
 void ivl_sim_momentum(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, double linear[3], double angular[3])

@@ -11,8 +11,8 @@
 #define IVL_SIM_STABILISATION_PER_S 150.0
 
 /// What acts on the body except the legs: weight, rotors, drag, plates, gyroscopic moment.
-IVL_SIM_INLINE void phys_body_wrench(const ivl_sim_model_t *model, const ivl_sim_load_t *load, const phys_posture_t *k, ivl_wide_t height,
-                                     ivl_wide_t b[IVL_SIM_TWIST], ivl_wide_t overlap[IVL_SIM_PLATES])
+IVL_SIM_INLINE void phys_body_wrench(const ivl_sim_model_t *model, const ivl_sim_load_t *load, const phys_posture_t *k,
+                                     const ivl_sim_state_t *s, ivl_wide_t b[IVL_SIM_TWIST], ivl_wide_t overlap[IVL_SIM_PLATES])
 {
     const ivl_sim_params_t *raw = &model->raw;
     const double            weight = raw->body_mass_kg * raw->world_gravity_mps2;
@@ -23,17 +23,7 @@ IVL_SIM_INLINE void phys_body_wrench(const ivl_sim_model_t *model, const ivl_sim
     b[3] = load->torque_B_Nm.x - (izz - iyy) * k->w.y * k->w.z;
     b[4] = load->torque_B_Nm.y - (ixx - izz) * k->w.z * k->w.x;
     b[5] = load->torque_B_Nm.z - (iyy - ixx) * k->w.x * k->w.y;
-    for (int p = 0; p < IVL_SIM_PLATES; p++)
-    {
-        overlap[p] = height + phys_plate_top(&model->plate[p], k->up) - raw->world_ceiling_height_m;
-        if (ivl_mask_any(overlap[p] > 0.0))
-        {
-            for (int i = 0; i < IVL_SIM_CORNERS; i++)
-            {
-                phys_corner_force(raw, k, height, model->plate[p].corner_B_m[i], b);
-            }
-        }
-    }
+    phys_plates_wrench(model, k, ivl_sim_surface_heights_of(&model->surface, s->p_WB_m), load->surface_height_m, b, overlap);
 }
 
 IVL_SIM_INLINE void phys_subtract_wrench(ivl_wide_t b[IVL_SIM_TWIST], ivl_w3_t force, ivl_w3_t moment)
@@ -58,7 +48,7 @@ IVL_SIM_INLINE void phys_accelerate(const ivl_sim_model_t *model, const ivl_sim_
     ivl_wide_t b[IVL_SIM_TWIST], r[IVL_SIM_LEGS], u[IVL_SIM_TWIST], axial[IVL_SIM_LEGS], fastest2 = ivl_wide(0.0), longest = ivl_wide(0.0);
     ivl_w3_t   f_foot[IVL_SIM_LEGS], centripetal[IVL_SIM_LEGS], couple[IVL_SIM_LEGS];
     phys_row_t rows[IVL_SIM_LEGS];
-    phys_body_wrench(model, load, &k, s->p_WB_m.z, b, rate->overlap_m);
+    phys_body_wrench(model, load, &k, s, b, rate->overlap_m);
     phys_hip_couples(model, contact, &k, couple, &rate->swing_norm);
     IVL_SIM_UNROLL
     for (int i = 0; i < IVL_SIM_LEGS; i++)
@@ -74,7 +64,7 @@ IVL_SIM_INLINE void phys_accelerate(const ivl_sim_model_t *model, const ivl_sim_
         // what the hip takes from the body if neither the body nor the constraint accelerated it
         centripetal[i] = ivl_w3_cross(k.w, ivl_w3_cross_d3(k.w, hip));
         const ivl_w3_t at_foot = ivl_w3_plus(f_foot[i], ivl_wide(-leg->mass_cross_kg), centripetal[i]);
-        const ivl_w3_t yield = ivl_w3_scale(leg->mass_cross_kg * inv_mass, phys_along_surface(sliding, k.up, at_foot));
+        const ivl_w3_t yield = ivl_w3_scale(leg->mass_cross_kg * inv_mass, phys_along_surface(sliding, k.normal, at_foot));
         const ivl_w3_t weight = ivl_w3_plus(pair, ivl_wide(leg->weight_hip_kg * gravity), k.up);
         const ivl_w3_t at_hip = ivl_w3_plus(ivl_w3_add(weight, yield), ivl_wide(leg->mass_hip_kg), centripetal[i]);
         phys_subtract_wrench(b, at_hip, ivl_w3_add(ivl_w3_cross_from_d3(hip, at_hip), ivl_w3_cross(k.rod[i], couple[i])));
@@ -87,8 +77,8 @@ IVL_SIM_INLINE void phys_accelerate(const ivl_sim_model_t *model, const ivl_sim_
         longest = phys_larger(longest, ivl_wide_abs(excess));
         const ivl_wide_t curvature =
             speed2 * (1.0 / length) + 2.0 * sigma * ivl_w3_dot(k.n[i], k.v_rod[i]) + (0.5 * sigma * sigma / length) * excess;
-        r[i] =
-            curvature + inv_mass * ivl_w3_dot(k.n[i], phys_along_surface(sliding, k.up, f_foot[i])) - ivl_w3_dot(rows[i].g, centripetal[i]);
+        r[i] = curvature + inv_mass * ivl_w3_dot(k.n[i], phys_along_surface(sliding, k.normal, f_foot[i])) -
+               ivl_w3_dot(rows[i].g, centripetal[i]);
     }
     rate->turn2_per_s2 = fastest2 * (1.0 / (length * length));
     rate->stretch_norm = longest * (0.5 / (length * length));
@@ -97,7 +87,7 @@ IVL_SIM_INLINE void phys_accelerate(const ivl_sim_model_t *model, const ivl_sim_
     if (contact->any_sliding)
     {
         memcpy(rebuilt, contact->inverse_mass6, sizeof rebuilt);
-        ivl_sim_mass_while_sliding(model, contact, &k.up, rebuilt);
+        ivl_sim_mass_while_sliding(model, contact, &k.normal, rebuilt);
         inverse6 = rebuilt;
     }
     phys_solve_constrained(inverse6, (const phys_row_t *)rows, b, r, u, axial);
@@ -111,9 +101,9 @@ IVL_SIM_INLINE void phys_accelerate(const ivl_sim_model_t *model, const ivl_sim_
     {
         const ivl_w3_t a_hip = ivl_w3_add(ivl_w3_add(a, centripetal[i]), ivl_w3_cross_d3(alpha, leg->hip_B_m[i]));
         const ivl_w3_t net = ivl_w3_plus(ivl_w3_plus(f_foot[i], -axial[i], k.n[i]), ivl_wide(-leg->mass_cross_kg), a_hip);
-        const ivl_w3_t a_foot = ivl_w3_scale(contact->inverse_mass[i], phys_along_surface(contact->sliding[i], k.up, net));
+        const ivl_w3_t a_foot = ivl_w3_scale(contact->inverse_mass[i], phys_along_surface(contact->sliding[i], k.normal, net));
         rate->a_foot_W_mps2[i] = ivl_wrot_apply(&k.R_WB, a_foot);
-        rate->pull_N[i] = -ivl_w3_dot(k.up, net);
+        rate->pull_N[i] = -ivl_w3_dot(k.normal, net);
     }
 }
 

@@ -21,7 +21,8 @@ _Static_assert(2 * IVL_SIM_LEGS <= IVL_SIM_ANGLES_MAX, "two hinges a leg");
 typedef struct
 {
     ivl_wrot_t R_WB;
-    ivl_w3_t   up;                   ///< the world's z axis
+    ivl_w3_t   up;                   ///< against gravity
+    ivl_w3_t   normal;               ///< of the surface
     ivl_w3_t   v, w;                 ///< of the body
     ivl_w3_t   rod[IVL_SIM_LEGS];    ///< hip to foot
     ivl_w3_t   n[IVL_SIM_LEGS];      ///< rod / length
@@ -32,7 +33,8 @@ IVL_SIM_INLINE void phys_posture(const ivl_sim_model_t *model, const ivl_sim_sta
 {
     const ivl_wide_t inv_length = ivl_wide(1.0 / model->raw.leg_length_m);
     k->R_WB = ivl_wrot_from_quat(s->q_WB);
-    k->up = k->R_WB.row[2];
+    k->up = ivl_wrot_direction(&k->R_WB, model->up_W);
+    k->normal = ivl_wrot_direction(&k->R_WB, model->surface.normal_W);
     k->w = s->w_B_radps;
     k->v = ivl_wrot_apply_inverse(&k->R_WB, s->v_WB_mps);
     for (int i = 0; i < IVL_SIM_LEGS; i++)
@@ -129,10 +131,10 @@ IVL_SIM_INLINE void phys_hip_couples(const ivl_sim_model_t *model, const ivl_sim
     }
 }
 
-/// Without the part along the ceiling's normal, for a foot that slides.
-IVL_SIM_INLINE ivl_w3_t phys_along_surface(ivl_wide_t sliding, ivl_w3_t up, ivl_w3_t a)
+/// Without the part along the surface's normal, for a foot that slides.
+IVL_SIM_INLINE ivl_w3_t phys_along_surface(ivl_wide_t sliding, ivl_w3_t normal, ivl_w3_t a)
 {
-    return ivl_w3_plus(a, -sliding * ivl_w3_dot(up, a), up);
+    return ivl_w3_plus(a, -sliding * ivl_w3_dot(normal, a), normal);
 }
 
 /// A leg's row of the constraint: multiplier direction g at the hip, its moment, its own compliance.  [MODEL eq. 4.9]
@@ -145,7 +147,7 @@ typedef struct
 IVL_SIM_INLINE phys_row_t phys_constraint_row(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const phys_posture_t *k,
                                               int i)
 {
-    const ivl_w3_t pn = phys_along_surface(contact->sliding[i], k->up, k->n[i]);
+    const ivl_w3_t pn = phys_along_surface(contact->sliding[i], k->normal, k->n[i]);
     phys_row_t     r;
     r.g = ivl_w3_plus(k->n[i], model->leg.mass_cross_kg * contact->inverse_mass[i], pn);
     r.hip_x_g = ivl_w3_cross_from_d3(model->leg.hip_B_m[i], r.g);

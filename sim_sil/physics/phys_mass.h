@@ -10,7 +10,7 @@
 typedef enum
 {
     IVL_SIM_FOOT_FREE,
-    IVL_SIM_FOOT_SLIDING,  ///< pressed on the ceiling, not yet stuck
+    IVL_SIM_FOOT_SLIDING,  ///< pressed on the surface, not yet stuck
     IVL_SIM_FOOT_STUCK,
 } ivl_sim_foot_t;
 

@@ -89,14 +89,16 @@ static double spin(const ivl_sim_model_t *model, const ivl_sim_rotor_t *rotor, d
     return command * command + 2.0 * command * gap * share * (1.0 - decay) + 0.5 * gap * gap * share * (1.0 - decay * decay);
 }
 
-/// Thrust gain near the ceiling, for an upright rotor.                                           [MODEL eq. 2.5]
-static double ceiling_effect(const ivl_sim_model_t *model, double height_m, const ivl_rot_t *R)
+/// Thrust gain near the surface, for a rotor that faces it.                                           [MODEL eq. 2.5]
+static double ceiling_effect(const ivl_sim_model_t *model, double gap_m, const ivl_rot_t *R)
 {
     const ivl_sim_params_t *raw = &model->raw;
-    const double            gap = raw->world_ceiling_height_m - height_m - R->row[2].z * raw->rotor_z_m;
+    const ivl_d3_t          n = model->surface.normal_W;
+    const double            facing = n.x * R->row[0].z + n.y * R->row[1].z + n.z * R->row[2].z;
+    const double            gap = gap_m - facing * raw->rotor_z_m;
     const double            least = 0.5 * raw->aero_rotor_radius_m;
     const double            ratio = raw->aero_rotor_radius_m / ((gap > least) ? gap : least);
-    const double            upright = (R->row[2].z > 0.0) ? R->row[2].z : 0.0;
+    const double            upright = (facing > 0.0) ? facing : 0.0;
     return 1.0 + raw->aero_ceiling_gain_norm * upright * ratio * ratio;
 }
 
@@ -115,7 +117,7 @@ static double air_gain(const ivl_sim_model_t *model, const ivl_sim_airflow_t *bo
     if (model->raw.aero_ceiling_gain_norm > 0.0 || model->raw.rotor_inflow_loss_spm > 0.0)
     {
         const ivl_rot_t R = ivl_rot_from_quat(body->q_WB);
-        gain = (model->raw.aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, body->height_m, &R) : gain;
+        gain = (model->raw.aero_ceiling_gain_norm > 0.0) ? ceiling_effect(model, body->gap_m, &R) : gain;
         gain *= (model->raw.rotor_inflow_loss_spm > 0.0) ? inflow(model, body->v_W_mps, &R) : 1.0;
     }
     return gain;

@@ -15,7 +15,7 @@ typedef struct
 /// What the air at the rotors depends on.
 typedef struct
 {
-    double height_m;    ///< of the body origin
+    double gap_m;       ///< from the body origin to the surface
     double v_W_mps[3];  ///< its velocity
     double q_WB[4];
 } ivl_sim_airflow_t;

@@ -25,11 +25,12 @@ typedef struct
     double p_foot_W_m[IVL_SIM_LEGS][3], v_foot_W_mps[IVL_SIM_LEGS][3];
 } ivl_sim_kin_t;
 
-/// Forces that are constant during one step.
+/// What acts on the vehicles and does not change during one step.
 typedef struct
 {
     ivl_wide_t thrust_N;  ///< along body z
     ivl_w3_t   torque_B_Nm;
+    ivl_wide_t surface_height_m;  ///< in the middle of the step, along the surface's normal
 } ivl_sim_load_t;
 
 /// Accelerations, and what else an evaluation finds.
@@ -38,8 +39,8 @@ typedef struct
     ivl_w3_t   a_WB_mps2;
     ivl_w3_t   alpha_B_radps2;
     ivl_w3_t   a_foot_W_mps2[IVL_SIM_LEGS];
-    ivl_wide_t pull_N[IVL_SIM_LEGS];       ///< pull of a held foot away from the ceiling; < 0 presses
-    ivl_wide_t overlap_m[IVL_SIM_PLATES];  ///< highest point of a plate above the ceiling; > 0 presses
+    ivl_wide_t pull_N[IVL_SIM_LEGS];       ///< pull of a held foot away from the surface; < 0 presses
+    ivl_wide_t overlap_m[IVL_SIM_PLATES];  ///< highest point of a plate above the surface; > 0 presses
     ivl_wide_t swing_norm;                 ///< inverse inertia of the fastest swing of a leg, over that of a free leg at rest
     ivl_wide_t turn2_per_s2;               ///< square of the rate at which the fastest rod turns
     ivl_wide_t stretch_norm;               ///< largest error of a rod's length, over the length

@@ -3,6 +3,8 @@
 #ifndef IVL_PHYS_VECTOR_H
 #define IVL_PHYS_VECTOR_H
 
+#include <stdbool.h>
+
 #define IVL_SIM_INLINE static inline __attribute__((always_inline))
 
 IVL_SIM_INLINE double ivl_sim_smaller(double a, double b)
@@ -50,6 +52,18 @@ IVL_SIM_INLINE ivl_d3_t ivl_d3_sub(ivl_d3_t a, ivl_d3_t b)
 IVL_SIM_INLINE ivl_d3_t ivl_d3_scale(double s, ivl_d3_t a)
 {
     return (ivl_d3_t){s * a.x, s * a.y, s * a.z};
+}
+
+/// True if the unit vector a is z, to within rounding.
+IVL_SIM_INLINE bool ivl_d3_is_z(ivl_d3_t a)
+{
+    return a.z >= 1.0;
+}
+
+/// Part of b along the unit vector a.  For z the products with 0 and 1 are left out: they would change no number.
+IVL_SIM_INLINE double ivl_d3_along(ivl_d3_t a, ivl_d3_t b)
+{
+    return ivl_d3_is_z(a) ? b.z : a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
 IVL_SIM_INLINE double ivl_d3_dot(ivl_d3_t a, ivl_d3_t b)

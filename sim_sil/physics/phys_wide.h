@@ -152,6 +152,18 @@ IVL_SIM_INLINE ivl_w3_t ivl_wrot_apply(const ivl_wrot_t *R, ivl_w3_t a)
     return (ivl_w3_t){ivl_w3_dot(R->row[0], a), ivl_w3_dot(R->row[1], a), ivl_w3_dot(R->row[2], a)};
 }
 
+/// A vector that is the same in all lanes, in the axes that each lane's rotation is of.
+IVL_SIM_INLINE ivl_w3_t ivl_wrot_apply_inverse_d3(const ivl_wrot_t *R, ivl_d3_t a)
+{
+    return ivl_w3_plus(ivl_w3_plus(ivl_w3_scale(ivl_wide(a.x), R->row[0]), ivl_wide(a.y), R->row[1]), ivl_wide(a.z), R->row[2]);
+}
+
+/// The same for a unit vector.  For z the products with 0 and 1 are left out: they would change no number.
+IVL_SIM_INLINE ivl_w3_t ivl_wrot_direction(const ivl_wrot_t *R, ivl_d3_t a)
+{
+    return ivl_d3_is_z(a) ? R->row[2] : ivl_wrot_apply_inverse_d3(R, a);
+}
+
 IVL_SIM_INLINE ivl_w3_t ivl_wrot_apply_inverse(const ivl_wrot_t *R, ivl_w3_t a)
 {
     return ivl_w3_plus(ivl_w3_plus(ivl_w3_scale(a.x, R->row[0]), a.y, R->row[1]), a.z, R->row[2]);

@@ -13,28 +13,43 @@ static const double REARM_GAP_M = 1.0e-3;
 static const double NEAR_MARGIN_M = 0.05;  // more than a vehicle moves in one step
 static const double FAR_M = 1.0;           // stands for the gap of what cannot make an event
 
-/// Height of a plate's highest point above the body origin depends on the world's z axis in body axes alone.
-static ivl_d3_t up_of(const ivl_sim_state_t *s, int lane)
+/// Height of a plate's highest point above the body origin depends on the surface's normal in body axes alone.
+static ivl_d3_t normal_of(const ivl_sim_surface_t *surface, const ivl_sim_state_t *s, int lane)
 {
-    const double x = s->q_WB[0][lane], y = s->q_WB[1][lane], z = s->q_WB[2][lane], w = s->q_WB[3][lane];
-    return ivl_d3(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y));
+    const double   x = s->q_WB[0][lane], y = s->q_WB[1][lane], z = s->q_WB[2][lane], w = s->q_WB[3][lane];
+    const ivl_d3_t row_z = ivl_d3(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y));
+    if (ivl_d3_is_z(surface->normal_W))
+    {
+        return row_z;
+    }
+    const ivl_rot_t R = {.row = {{1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+                                 {2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)},
+                                 row_z}};
+    return ivl_rot_apply_inverse(&R, surface->normal_W);
 }
 
-void world_gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double gap[IVL_SIM_GAPS])
+static double foot_gap(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double surface_m, int i)
 {
-    const ivl_sim_params_t *raw = &w->model->raw;
-    const double            room = raw->world_ceiling_height_m - s->p_WB_m.z[lane];
-    const bool              near = room < w->model->reach_m + NEAR_MARGIN_M;
+    return surface_m - ivl_sim_surface_height_of(&w->model->surface, ivl_w3_lane(&s->p_foot_W_m[i], lane)) -
+           w->model->raw.leg_foot_radius_m;
+}
+
+void world_gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double t_s, double gap[IVL_SIM_GAPS])
+{
+    const ivl_sim_surface_t *surface = &w->model->surface;
+    const double             surface_m = ivl_sim_world_surface_m(w, t_s);
+    const double             room = surface_m - ivl_sim_surface_height_of(surface, ivl_w3_lane(&s->p_WB_m, lane));
+    const bool               near = room < w->model->reach_m + NEAR_MARGIN_M;
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const bool may_touch = near && (w->foot[i] == IVL_SIM_FOOT_FREE) && !w->detached[i];
-        gap[i] = may_touch ? raw->world_ceiling_height_m - s->p_foot_W_m[i].z[lane] - raw->leg_foot_radius_m : FAR_M;
+        gap[i] = may_touch ? foot_gap(w, s, lane, surface_m, i) : FAR_M;
     }
-    const ivl_d3_t up = near ? up_of(s, lane) : ivl_d3(0.0, 0.0, 1.0);
+    const ivl_d3_t normal = near ? normal_of(surface, s, lane) : ivl_d3(0.0, 0.0, 1.0);
     for (int i = 0; i < IVL_SIM_PLATES; i++)
     {
         const bool may_touch = near && !w->plate_touched[i];
-        gap[IVL_SIM_LEGS + i] = may_touch ? room - ivl_sim_plate_top(&w->model->plate[i], up) : FAR_M;
+        gap[IVL_SIM_LEGS + i] = may_touch ? room - ivl_sim_plate_top(&w->model->plate[i], normal) : FAR_M;
     }
 }
 
@@ -75,11 +90,12 @@ static double first_zero(double g0, double d0, double g1, double d1, double tole
 
 double world_event_share(ivl_sim_group_t *group, int lane)
 {
-    ivl_sim_world_t *w = &group->world[lane];
-    const double    *g0 = w->trial.gap_m, dt = w->trial.dt_s;
-    double           share = WORLD_NO_EVENT;
-    double          *g1 = w->trial.gap_after_m;
-    world_gaps(w, &group->next, lane, g1);
+    ivl_sim_world_t         *w = &group->world[lane];
+    const double            *g0 = w->trial.gap_m, dt = w->trial.dt_s;
+    double                   share = WORLD_NO_EVENT;
+    double                  *g1 = w->trial.gap_after_m;
+    const ivl_sim_surface_t *surface = &w->model->surface;
+    world_gaps(w, &group->next, lane, w->t_s + dt, g1);
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
         double s = WORLD_NO_EVENT;
@@ -90,7 +106,8 @@ double world_event_share(ivl_sim_group_t *group, int lane)
         else if (g1[i] < FAR_M)
         {
             // a foot rings: cubic through height and speed, so that a touch within the step is not missed
-            const double d0 = -dt * group->state.v_foot_W_mps[i].z[lane], d1 = -dt * group->next.v_foot_W_mps[i].z[lane];
+            const double d0 = -dt * ivl_sim_surface_closing(surface, ivl_w3_lane(&group->state.v_foot_W_mps[i], lane));
+            const double d1 = -dt * ivl_sim_surface_closing(surface, ivl_w3_lane(&group->next.v_foot_W_mps[i], lane));
             s = first_zero(g0[i], d0, g1[i], d1, FOOT_TOLERANCE_M);
         }
         share = (s < share) ? s : share;
@@ -181,7 +198,7 @@ bool world_handle_held(ivl_sim_group_t *group, int lane)
         }
         else if (w->detached[i])
         {
-            const double gap = raw->world_ceiling_height_m - group->state.p_foot_W_m[i].z[lane] - raw->leg_foot_radius_m;
+            const double gap = foot_gap(w, &group->state, lane, ivl_sim_world_surface_m(w, w->t_s), i);
             w->detached[i] = !(gap > REARM_GAP_M);
         }
     }

@@ -1,5 +1,5 @@
 /// @file world_group.h
-/// Vehicles under a ceiling: sensors, flight core, rotors, body and legs, contact events.
+/// Vehicles and a surface to land on: sensors, flight core, rotors, body and legs, contact events.
 ///
 /// As many worlds as there are lanes form a group and share each integration step; each has its own clock, step length and events, and no
 /// world's bits depend on the others'.  One world alone is a group whose
@@ -18,7 +18,7 @@ enum
     IVL_SIM_GAPS = IVL_SIM_LEGS + IVL_SIM_PLATES  ///< distances that make an event: feet, then plates
 };
 
-/// The first contact of any foot or plate with the ceiling, just before it acts.
+/// The first contact of any foot or plate with the surface, just before it acts.
 typedef struct
 {
     bool          happened;
@@ -43,6 +43,7 @@ typedef struct
     const ivl_sim_model_t *model;
     ivl_sim_rng_t          rng;
     double                 t_s;
+    double                 surface_m;                      ///< height of the surface at time 0
     double                 left_s;                         ///< of the present tick
     uint32_t               n_tick;                         ///< ticks of the flight core since the start
     uint32_t               n_step;                         ///< integration steps since the start
@@ -67,7 +68,7 @@ typedef struct
     int8_t                 stuck_order[IVL_SIM_LEGS];  ///< leg numbers 1..4 in the order of first sticking, 0 none
     int                    n_order;
     bool                   plate_touched[IVL_SIM_PLATES];
-    double                 d_min_m;  ///< smallest distance of the body origin from the ceiling's surface
+    double                 d_min_m;  ///< smallest distance of the body origin from the surface
 } ivl_sim_world_t;
 
 typedef struct
@@ -110,6 +111,12 @@ void ivl_sim_world_rest_legs(const ivl_sim_model_t *model, ivl_sim_kin_t *kin);
 
 /// Within a tick: this tick becomes the first one, at time 0, of a vehicle that has touched nothing yet.  Motion and sensors go on.
 void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane);
+
+/// Height of the surface along its normal.
+double ivl_sim_world_surface_m(const ivl_sim_world_t *world, double t_s);
+
+/// Distance of the body origin from the surface, at present.
+double ivl_sim_world_gap_m(const ivl_sim_group_t *group, int lane);
 
 /// State of motion of one vehicle.
 ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane);

@@ -71,8 +71,8 @@ void ivl_sim_reckoning_move(const ivl_sim_model_t *model, const double q_WB[4], 
 {
     const ivl_rot_t R = ivl_rot_from_quat(q_WB);
     double          a[3];
-    ivl_d3_store(a, ivl_rot_apply(&R, ivl_d3_load(f_B_mps2)));
-    a[2] -= model->raw.world_gravity_mps2;
+    const ivl_d3_t  weight = ivl_d3_scale(model->raw.world_gravity_mps2, model->up_W);
+    ivl_d3_store(a, ivl_d3_sub(ivl_rot_apply(&R, ivl_d3_load(f_B_mps2)), weight));
     for (int i = 0; i < 3; i++)
     {
         reckoning->p_W_m[i] += model->tick_s * (reckoning->v_W_mps[i] + 0.5 * model->tick_s * a[i]);

@@ -1,7 +1,7 @@
 /// Range along b_z.
 #include "world_reading_rows.h"
 
-/// Infinite where the ceiling is out of the sensor's sight.
+/// Infinite where the surface is out of the sensor's sight.
 double ivl_sim_truth_range(const ivl_sim_scene_t *scene, double age_s)
 {
     const double facing = ivl_sim_scene_facing(scene);

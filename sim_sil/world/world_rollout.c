@@ -37,11 +37,15 @@ static void level_start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec
 {
     double sin_angle, cos_angle;
     ivl_sim_sincos(spec->angle_deg[0] * (IVL_SIM_PI / 180.0), &sin_angle, &cos_angle);
-    const double plane = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m;
-    const double speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : spec->speed_mps[0];
-    start->p_W_m[2] = plane - start_distance(model, spec, sin_angle);
-    start->v_W_mps[0] = speed * cos_angle;
-    start->v_W_mps[2] = speed * sin_angle;
+    const ivl_sim_surface_t *surface = &model->surface;
+    const ivl_d3_t           n = surface->normal_W, forward = ivl_sim_surface_forward(surface);
+    const double             height = ivl_sim_surface_height(surface, 0.0);
+    const double             plane = height + model->raw.world_sensed_gap_offset_m;
+    const double             speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : spec->speed_mps[0];
+    const ivl_d3_t           foot = ivl_d3_sub(surface->point_W_m, ivl_d3_scale(height, n));
+    const ivl_d3_t           approach = ivl_d3_add(ivl_d3_scale(speed * cos_angle, forward), ivl_d3_scale(speed * sin_angle, n));
+    ivl_d3_store(start->p_W_m, ivl_d3_add(foot, ivl_d3_scale(plane - start_distance(model, spec, sin_angle), n)));
+    ivl_d3_store(start->v_W_mps, approach);
     start->q_WB[3] = 1.0;
 }
 
@@ -90,23 +94,25 @@ static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], 
     cmd->angle_rad = (float)(spec->angle_deg[0] * (IVL_SIM_PI / 180.0));
 }
 
-/// True if some part of the vehicle reaches beyond the ceiling: no landing can begin there.
-static bool behind_ceiling(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
+/// True if some part of the vehicle reaches beyond the surface: no landing can begin there.
+static bool behind_surface(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
 {
     const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
-    const ivl_d3_t  up = ivl_d3(R.row[2].x, R.row[2].y, R.row[2].z);
-    double          top = kin->p_WB_m[2];
+    const ivl_d3_t  normal = ivl_rot_apply_inverse(&R, model->surface.normal_W);
+    const double    height = ivl_sim_surface_height_of(&model->surface, ivl_d3_load(kin->p_WB_m));
+    double          top = height;
     for (int i = 0; i < IVL_SIM_PLATES; i++)
     {
-        const double plate = kin->p_WB_m[2] + ivl_sim_plate_top(&model->plate[i], up);
+        const double plate = height + ivl_sim_plate_top(&model->plate[i], normal);
         top = (plate > top) ? plate : top;
     }
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        const double foot = kin->p_foot_W_m[i][2] + model->raw.leg_foot_radius_m;
+        const double center = ivl_sim_surface_height_of(&model->surface, ivl_d3_load(kin->p_foot_W_m[i]));
+        const double foot = center + model->raw.leg_foot_radius_m;
         top = (foot > top) ? foot : top;
     }
-    return !(top < model->raw.world_ceiling_height_m);
+    return !(top < ivl_sim_surface_height(&model->surface, 0.0));
 }
 
 bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_t *spec)
@@ -130,7 +136,7 @@ bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_
     }
     ivl_sim_world_start_from(group, lane, &rng, &start);
     const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
-    if (behind_ceiling(model, &kin))
+    if (behind_surface(model, &kin))
     {
         return false;
     }
@@ -163,7 +169,8 @@ static void note_trigger(const ivl_sim_kin_t *before, const ivl_sim_world_t *wor
     o->vz_trigger_mps[0] = before->v_WB_mps[2];
     o->rate_trigger_radps[0] = -before->w_B_radps[1];
     o->d_trigger_m[0] = (double)firmware->snapshot.d_ceil_m;
-    o->d_true_trigger_m[0] = raw->world_ceiling_height_m + raw->world_sensed_gap_offset_m - before->p_WB_m[2];
+    o->d_true_trigger_m[0] = ivl_sim_world_surface_m(world, world->t_s) + raw->world_sensed_gap_offset_m -
+                             ivl_sim_surface_height_of(&world->model->surface, ivl_d3_load(before->p_WB_m));
     o->d_sigma_trigger_m[0] = (double)firmware->snapshot.d_sigma_m;
     o->rrev_trigger[0] = (double)firmware->snapshot.rrev_per_s;
     o->of_y_trigger[0] = (double)firmware->snapshot.of_y_radps;
@@ -204,17 +211,24 @@ static void note_end(const ivl_sim_world_t *world, ivl_sim_end_t end, ivl_sim_ou
     }
 }
 
-/// With the motors cut the centre of mass is a projectile: if its apex plus the reach of the vehicle stays below the
-/// ceiling, no contact can follow.  The legs' share of the centre of mass lies within `reach` of the origin.
-static bool out_of_reach(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
+/// With the motors cut the centre of mass is a projectile: if its apex plus the reach of the vehicle stays away from the
+/// surface, no contact can follow.  The legs' share of the centre of mass lies within `reach` of the origin.
+static bool out_of_reach(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, double surface_height_m)
 {
     double linear[3], angular[3];
     ivl_sim_momentum(model, kin, linear, angular);
-    const double vz = linear[2] / model->mass_total_kg;
-    const double rise = (vz > 0.0) ? 0.5 * vz * vz / model->raw.world_gravity_mps2 : 0.0;
+    const ivl_sim_surface_t *surface = &model->surface;
+    const double             pull = model->raw.world_gravity_mps2 * ivl_d3_dot(model->up_W, surface->normal_W);
+    if (pull < 0.0)
+    {
+        return false;  // it falls on what it faces
+    }
+    const double rising = ivl_d3_along(surface->normal_W, ivl_d3_load(linear)) / model->mass_total_kg;
+    const double closing = rising - ivl_sim_surface_speed(surface);
+    const double rise = (closing > 0.0) ? 0.5 * closing * closing / pull : 0.0;
     const double leg_share = 1.0 - model->raw.body_mass_kg / model->mass_total_kg;
     const double reach = model->reach_m * (1.0 + 2.0 * leg_share);
-    return kin->p_WB_m[2] + rise + reach < model->raw.world_ceiling_height_m;
+    return ivl_sim_surface_height_of(surface, ivl_d3_load(kin->p_WB_m)) + rise + reach < surface_height_m;
 }
 
 static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_t *o, ivl_sim_end_t *end)
@@ -253,7 +267,7 @@ static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_
         return false;
     }
     const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
-    return out_of_reach(world->model, &kin);
+    return out_of_reach(world->model, &kin, ivl_sim_world_surface_m(world, world->t_s));
 }
 
 void ivl_sim_rollout_row(const ivl_sim_group_t *group, int lane, ivl_sim_trace_t *row)
@@ -285,12 +299,12 @@ void ivl_sim_rollout_row(const ivl_sim_group_t *group, int lane, ivl_sim_trace_t
     }
     row->phase[0] = (int32_t)w->firmware.phase;
     row->body_contact[0] = w->plate_touched[IVL_SIM_PROP_PLATE] ? 1 : 0;
-    row->d_ceil_m[0] = model->raw.world_ceiling_height_m - kin->p_WB_m[2];
+    row->d_ceil_m[0] = ivl_sim_world_gap_m(group, lane);
     row->d_sensed_m[0] = (double)w->out.ceiling.d_ceil_m;
     row->d_sigma_m[0] = (double)w->out.ceiling.d_sigma_m;
     row->rrev_per_s[0] = (double)w->out.cues.rrev_per_s;
     row->of_y_radps[0] = (double)w->out.cues.of_y_radps;
-    row->energy_J[0] = ivl_sim_energy(model, kin);
+    row->energy_J[0] = ivl_sim_energy(model, kin, ivl_sim_world_surface_m(w, w->t_s));
 }
 
 /// A row for each period that has begun; rows stand at ticks of the flight core.

@@ -142,7 +142,8 @@ static void read_attitude(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng
 /// Mean specific force since the last tick, in the body's axes.
 static void specific_force(const ivl_sim_model_t *model, const ivl_sim_kin_t *state, ivl_sim_sensors_t *sensors, double accel[3])
 {
-    double mean[3] = {0.0, 0.0, model->raw.world_gravity_mps2};
+    double mean[3];
+    ivl_d3_store(mean, ivl_d3_scale(model->raw.world_gravity_mps2, model->up_W));
     for (int i = 0; i < 3 && sensors->n_tick > 0; i++)
     {
         mean[i] += (state->v_WB_mps[i] - sensors->v_last_W_mps[i]) / model->tick_s;

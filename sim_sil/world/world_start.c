@@ -56,9 +56,10 @@ void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group)
     ivl_sim_world_rest_legs(model, &resting);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        // an empty lane is computed along with the others: it must hold numbers
+        // an empty lane is computed along with the others: it must hold numbers, and be away from the surface
         ivl_sim_lane_set(&group->state, lane, &resting);
         ivl_sim_contact_set(model, &group->contact, lane, free_feet);
+        group->load.surface_height_m[lane] = ivl_sim_surface_height_of(&model->surface, ivl_d3_load(resting.p_WB_m)) + 2.0 * model->reach_m;
     }
 }
 
@@ -68,7 +69,18 @@ void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *
     ivl_sim_lane_set(&group->state, lane, kin);
     w->restart = true;
     w->gave_up = false;
-    w->d_min_m = w->model->raw.world_ceiling_height_m - kin->p_WB_m[2];
+    w->d_min_m = ivl_sim_world_gap_m(group, lane);
+}
+
+double ivl_sim_world_surface_m(const ivl_sim_world_t *w, double t_s)
+{
+    return w->surface_m + t_s * ivl_sim_surface_speed(&w->model->surface);
+}
+
+double ivl_sim_world_gap_m(const ivl_sim_group_t *group, int lane)
+{
+    const ivl_sim_world_t *w = &group->world[lane];
+    return ivl_sim_world_surface_m(w, w->t_s) - ivl_sim_surface_height_of(&w->model->surface, ivl_w3_lane(&group->state.p_WB_m, lane));
 }
 
 ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane)
@@ -127,6 +139,7 @@ void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rn
     memset(w, 0, sizeof *w);
     w->model = model;
     w->rng = *rng;
+    w->surface_m = ivl_sim_surface_height(&model->surface, 0.0);
     w->graded_s = model->raw.step_flight_s * model->raw.step_scale_norm;
     w->step_s = w->graded_s;
     ivl_sim_contact_set(model, &group->contact, lane, w->foot);
@@ -160,6 +173,7 @@ void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane)
         w->t_touch_s[i] -= past_s;
         w->stuck_order[i] = 0;
     }
+    w->surface_m = ivl_sim_world_surface_m(w, past_s);
     w->t_s = 0.0;
     w->n_tick = 1;
     w->n_step = 0;
@@ -167,5 +181,5 @@ void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane)
     w->n_order = 0;
     w->impact = (ivl_sim_impact_t){.happened = false};
     memset(w->plate_touched, 0, sizeof w->plate_touched);
-    w->d_min_m = w->model->raw.world_ceiling_height_m - group->state.p_WB_m.z[lane];
+    w->d_min_m = ivl_sim_world_gap_m(group, lane);
 }

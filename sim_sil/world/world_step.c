@@ -15,13 +15,14 @@ static void propose(ivl_sim_group_t *group, int lane, double dt)
     if (w->trial.powered)
     {
         const ivl_sim_state_t  *s = &group->state;
-        const ivl_sim_airflow_t body = {.height_m = s->p_WB_m.z[lane],
+        const ivl_sim_airflow_t body = {.gap_m = ivl_sim_world_gap_m(group, lane),
                                         .v_W_mps = {s->v_WB_mps.x[lane], s->v_WB_mps.y[lane], s->v_WB_mps.z[lane]},
                                         .q_WB = {s->q_WB[0][lane], s->q_WB[1][lane], s->q_WB[2][lane], s->q_WB[3][lane]}};
         w->trial.rotor = w->rotor;
         thrust = ivl_sim_rotor_step(w->model, &w->trial.rotor, &body, dt);
     }
     group->dt_s[lane] = dt;
+    group->load.surface_height_m[lane] = ivl_sim_world_surface_m(w, w->t_s + 0.5 * dt);
     group->load.thrust_N[lane] = thrust.thrust_N;
     group->load.torque_B_Nm.x[lane] = thrust.torque_B_Nm[0];
     group->load.torque_B_Nm.y[lane] = thrust.torque_B_Nm[1];
@@ -33,7 +34,7 @@ static void begin_step(ivl_sim_group_t *group, int lane)
     ivl_sim_world_t *w = &group->world[lane];
     if (w->restart)
     {
-        world_gaps(w, &group->state, lane, w->trial.gap_m);
+        world_gaps(w, &group->state, lane, w->t_s, w->trial.gap_m);
     }
     else
     {
@@ -61,7 +62,7 @@ static bool judge(ivl_sim_group_t *group, int lane)
         return true;
     }
     const double most = world_longest_retry(group, lane);
-    // where a motion that is none meets the ceiling says nothing, and to step there would take for ever
+    // where a motion that is none meets the surface says nothing, and to step there would take for ever
     const bool   locate = w->trial.n_try < IVL_SIM_LOCATE_MAX && !ivl_sim_world_diverged(&group->next, lane);
     const double share = locate ? world_event_share(group, lane) : WORLD_NO_EVENT;
     const double dt = (share < 1.0) ? share * w->trial.dt_s : w->trial.dt_s;
@@ -77,7 +78,8 @@ static bool judge(ivl_sim_group_t *group, int lane)
 bool ivl_sim_world_diverged(const ivl_sim_state_t *s, int lane)
 {
     const double rate_radps = fabs(s->w_B_radps.x[lane]) + fabs(s->w_B_radps.y[lane]) + fabs(s->w_B_radps.z[lane]);
-    return !(rate_radps < 1.0e6 && fabs(s->p_WB_m.z[lane]) < 1.0e6);
+    const double far_m = fabs(s->p_WB_m.x[lane]) + fabs(s->p_WB_m.y[lane]) + fabs(s->p_WB_m.z[lane]);
+    return !(rate_radps < 1.0e6 && far_m < 1.0e6);
 }
 
 static void accept(ivl_sim_group_t *group, int lane)
@@ -85,7 +87,7 @@ static void accept(ivl_sim_group_t *group, int lane)
     ivl_sim_world_t *w = &group->world[lane];
     if (w->trial.starting)
     {
-        world_gaps(w, &group->next, lane, w->trial.gap_after_m);
+        world_gaps(w, &group->next, lane, w->t_s, w->trial.gap_after_m);
         return;
     }
     if (w->trial.powered)
@@ -99,7 +101,8 @@ static void accept(ivl_sim_group_t *group, int lane)
     {
         w->left_s = 0.0;  // the tick ends here, and with it the landing
     }
-    const double d = w->model->raw.world_ceiling_height_m - group->next.p_WB_m.z[lane];
+    const double height = ivl_sim_surface_height_of(&w->model->surface, ivl_w3_lane(&group->next.p_WB_m, lane));
+    const double d = ivl_sim_world_surface_m(w, w->t_s) - height;
     w->d_min_m = (d < w->d_min_m) ? d : w->d_min_m;
     world_grow_step(w, &group->next, &group->rate, lane);
 }

@@ -45,7 +45,7 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
     {
         ivl_sim_kin_t kin;  // of which sensors need the body's part
         body_of(&group->state, lane, &kin);
-        ivl_sim_scene_t scene = {.model = model, .kin = &kin};
+        ivl_sim_scene_t scene = {.model = model, .kin = &kin, .surface_height_m = ivl_sim_world_surface_m(w, w->t_s)};
         ivl_d3_store(scene.a_W_mps2, ivl_w3_lane(&group->last.a_WB_mps2, lane));
         ivl_sim_sensors_read(&scene, &w->rng, w->t_s, &w->sensors, &w->in);
         fly(group, lane);

@@ -199,7 +199,9 @@ ivl_sim_rate_t evaluate(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, 
         ivl_sim_lane_set(&state, lane, kin);
         ivl_sim_contact_set(model, &contact, lane, foot);
     }
-    const ivl_sim_load_t load = {ivl_wide(thrust_N), ivl_w3_of(torque_B_Nm)};
+    const ivl_sim_load_t load = {.thrust_N = ivl_wide(thrust_N),
+                                 .torque_B_Nm = ivl_w3_of(torque_B_Nm),
+                                 .surface_height_m = ivl_wide(ivl_sim_surface_height(&model->surface, 0.0))};
     ivl_sim_leapfrog(model, &contact, &load, &dt, &state, &last, &next, &rate);
     return rate;
 }
@@ -218,8 +220,13 @@ double rod_error(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
     return worst;
 }
 
+double energy_at_rest(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
+{
+    return ivl_sim_energy(model, kin, ivl_sim_surface_height(&model->surface, 0.0));
+}
+
 double total_energy(const ivl_sim_group_t *group)
 {
     const ivl_sim_kin_t kin = ivl_sim_world_kin(group, 0);
-    return ivl_sim_energy(group->model, &kin);
+    return ivl_sim_energy(group->model, &kin, ivl_sim_world_surface_m(&group->world[0], group->world[0].t_s));
 }

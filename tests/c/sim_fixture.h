@@ -54,6 +54,9 @@ ivl_sim_rate_t evaluate(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, 
 /// Largest difference in length of a rod from what it should be.
 double rod_error(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin);
 
+/// Energy of one vehicle before a surface at rest.
+double energy_at_rest(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin);
+
 double total_energy(const ivl_sim_group_t *group);
 
 #endif  // SIM_FIXTURE_H

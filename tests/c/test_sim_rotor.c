@@ -7,7 +7,7 @@
 /// Level and at rest, at a height.
 static ivl_sim_airflow_t level_at(double height_m)
 {
-    return (ivl_sim_airflow_t){.height_m = height_m, .q_WB = {0.0, 0.0, 0.0, 1.0}};
+    return (ivl_sim_airflow_t){.gap_m = 3.0 - height_m, .q_WB = {0.0, 0.0, 0.0, 1.0}};
 }
 
 static ivl_sim_thrust_t step(const ivl_sim_model_t *model, ivl_sim_rotor_t *rotor, double height_m, double dt_s)
@@ -200,7 +200,7 @@ static void test_ceiling_effect_vanishes_when_the_vehicle_is_inverted(void)
     ivl_sim_params_t params = fixture_params();
     params.aero_ceiling_gain_norm = 0.0625;
     const ivl_sim_model_t   model = fixture_model(&params);
-    const ivl_sim_airflow_t body = {.height_m = params.world_ceiling_height_m - 0.05, .q_WB = {0.0, 1.0, 0.0, 0.0}};
+    const ivl_sim_airflow_t body = {.gap_m = 0.05, .q_WB = {0.0, 1.0, 0.0, 0.0}};
     ivl_sim_rotor_t         rotor;
     ivl_sim_rotor_init(&model, &rotor);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, model.mass_total_kg * params.world_gravity_mps2,

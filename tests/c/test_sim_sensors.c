@@ -19,7 +19,10 @@ static const double A_MOVING[3] = {0.0, 0.0, 3.0};
 
 static void look(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, const double a_W_mps2[3], double t, ivl_in_t *in)
 {
-    const ivl_sim_scene_t scene = {.model = model, .kin = kin, .a_W_mps2 = {a_W_mps2[0], a_W_mps2[1], a_W_mps2[2]}};
+    const ivl_sim_scene_t scene = {.model = model,
+                                   .kin = kin,
+                                   .surface_height_m = ivl_sim_surface_height(&model->surface, 0.0),
+                                   .a_W_mps2 = {a_W_mps2[0], a_W_mps2[1], a_W_mps2[2]}};
     ivl_sim_sensors_read(&scene, &RNG, t, &sensors, in);
 }
 

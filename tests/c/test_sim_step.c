@@ -59,6 +59,7 @@ static double growth(const ivl_sim_model_t *model, double dt, uint64_t seed)
     memset(kin.v_foot_W_mps, 0, sizeof kin.v_foot_W_mps);
     memset(&contact, 0, sizeof contact);
     memset(&load, 0, sizeof load);
+    load.surface_height_m = ivl_wide(ivl_sim_surface_height(&model->surface, 0.0));
     memset(&last, 0, sizeof last);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {

@@ -223,7 +223,7 @@ def test_ctrl_c_says_how_to_resume_and_the_resumed_run_is_the_same(
 ) -> None:
     whole = json_of(["learn", str(small_file), "--out", "whole"], capsys)
 
-    def interrupt(_: object) -> None:
+    def interrupt(_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
