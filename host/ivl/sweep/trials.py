@@ -155,7 +155,7 @@ class Columns:
         return {}
 
     def rollouts(self, *, episode: int) -> RolloutRows:
-        """Rollouts of the planned episode; no rows of any other one."""
+        """Rollouts of the planned episode; no rows of any other one. Terms of the returns stay in the log."""
         log, own = self._log, self._trials if episode == self._episode else self._trials[:0]
         return RolloutRows(
             trial=np.repeat(own, self._n),
@@ -166,7 +166,6 @@ class Columns:
             theta=log.theta[own, episode].reshape(-1, log.theta.shape[-1]),
             reward=log.reward[own, episode].ravel(),
             outcomes=log.outcomes[own, episode].ravel(),
-            terms={name: values[own, episode].ravel() for name, values in log.terms.items()},
         )
 
     def plan(
