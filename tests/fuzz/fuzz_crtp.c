@@ -13,7 +13,7 @@
 #include "cf/cf_vehicle.h"
 #include "crtp/crtp_control.h"
 #include "crtp/crtp_model_file.h"
-#include "crtp/crtp_server.h"
+#include "crtp/crtp_dispatch.h"
 
 int LLVMFuzzerInitialize(int *argc, char ***argv);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
