@@ -253,7 +253,7 @@ typedef struct
     const char *name;
     uint32_t    phases;
     condition_t when;
-    ivl_act_t   act;
+    uint8_t     act;  // ivl_act_t; a byte, so that a row stays one of four words
     bool        discards;
 } row_t;
 
@@ -294,7 +294,7 @@ static bool is_rule(ivl_rule_t rule)
 
 ivl_act_t ivl_guard_act(ivl_rule_t rule)
 {
-    return is_rule(rule) ? ROWS[rule].act : IVL_ACT_NONE;
+    return is_rule(rule) ? (ivl_act_t)ROWS[rule].act : IVL_ACT_NONE;
 }
 
 bool ivl_guard_discards(ivl_rule_t rule)
