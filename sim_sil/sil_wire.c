@@ -114,3 +114,8 @@ const char *ivl_sil_rule_name(int code)
 {
     return (code >= 0) ? ivl_guard_name((ivl_rule_t)code) : "?";
 }
+
+int ivl_sil_rule_discards(int code)
+{
+    return (code >= 0 && code < (int)IVL_RULE_COUNT) ? (int)ivl_guard_discards((ivl_rule_t)code) : -1;
+}

@@ -29,4 +29,7 @@ uint32_t ivl_sil_model_config(const void *model, void *config);
 /// Lower-case name of a safety rule, "?" for a number that is none.
 const char *ivl_sil_rule_name(int code);
 
+/// 1: a flight that this rule ended says nothing about its policy.  0: its outcome counts.  -1: there is no such rule.
+int ivl_sil_rule_discards(int code);
+
 #endif  // IVL_SIL_WIRE_H

@@ -79,9 +79,8 @@ void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, 
         out->thrust_N[i] = ivl_sim_motor_N(out->thrust_N[i] / max_N, max_N);
     }
     // the controller is called more often than the core, and carries the attitude on with the gyro that it has
-    ivl_in_t between = *in;
     for (int i = 1; i < n_loop; i++)
     {
-        app_sense_motion(&autopilot->senses, &sensors, &state, firmware->phase, loop_s, sensed->t_us, &between);
+        app_sense_attitude(&autopilot->senses, &sensors, &state, firmware->phase, loop_s);
     }
 }

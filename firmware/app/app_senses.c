@@ -23,6 +23,11 @@ static uint64_t pose_time_us(app_senses_t *senses, ivl_vec3_t p_WB_m, uint64_t n
     return senses->t_pose_us;
 }
 
+void app_sense_attitude(app_senses_t *senses, const sensorData_t *sensors, const state_t *state, ivl_phase_t phase, float loop_s)
+{
+    ivl_attitude_update(&senses->attitude, app_q_WB(state), follows_estimator(phase), app_w_B_radps(sensors), loop_s);
+}
+
 void app_sense_motion(app_senses_t *senses, const sensorData_t *sensors, const state_t *state, ivl_phase_t phase, float loop_s,
                       uint64_t now_us, ivl_in_t *in)
 {
@@ -31,7 +36,7 @@ void app_sense_motion(app_senses_t *senses, const sensorData_t *sensors, const s
     in->v_WB_mps = app_v_W_mps(state);
     in->w_B_radps = app_w_B_radps(sensors);
     in->f_B_mps2 = app_f_B_mps2(sensors);
-    ivl_attitude_update(&senses->attitude, app_q_WB(state), follows_estimator(phase), in->w_B_radps, loop_s);
+    app_sense_attitude(senses, sensors, state, phase, loop_s);
     in->q_WB = senses->attitude.q_WB;
     in->t_pose_us = pose_time_us(senses, in->p_WB_m, now_us);
 }

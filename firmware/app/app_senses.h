@@ -19,6 +19,10 @@ typedef struct
     float          range_seen_mm;  ///< of the last call
 } app_senses_t;
 
+/// Attitude alone: follows the estimator, or is carried on with the gyro.  A part of app_sense_motion; by itself for a call in which nothing
+/// else can have changed.
+void app_sense_attitude(app_senses_t *senses, const sensorData_t *sensors, const state_t *state, ivl_phase_t phase, float loop_s);
+
 /// Motion: converts into the core's units, carries the attitude on with the gyro, and dates the position by its last change.
 /// @param[in] phase   of the core, before this call: attitude follows the estimator where an estimator for upright flight can be right
 /// @param[in] loop_s  time between two calls

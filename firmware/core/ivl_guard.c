@@ -205,61 +205,72 @@ CONDITION(cue_invalid)
 #define ABORTED  (1u << IVL_PHASE_ABORTED)
 #define BEFORE   (IDLE | READY | APPROACH)
 
+// what a flight that this rule ended says about its policy: nothing, so that it is discarded, or what its outcome says
+#define DISCARDS true
+#define SCORED   false
+
+// clang-format off
+/// X(with, id of IVL_RULE_, name, phases, condition, act of IVL_ACT_, discards), in the order of ivl_rule_t; `with` is handed on
+#define RULES(X, with) \
+    X(with, NONE,          "none",          0u,            NULL,               NONE,   DISCARDS)  \
+    /* to arm */                                                                                  \
+    X(with, CONFIG,        "config",        IDLE,          not_configured,     REFUSE, DISCARDS)  \
+    X(with, BYPASS,        "bypass",        IDLE,          motors_bypassed,    REFUSE, DISCARDS)  \
+    X(with, REARM,         "rearm",         IDLE,          not_rearmed,        REFUSE, DISCARDS)  \
+    X(with, BATTERY_REST,  "battery_rest",  IDLE,          battery_below_rest, REFUSE, DISCARDS)  \
+    /* before the trigger: refuses to arm, later aborts */                                        \
+    X(with, STATE,         "state",         BEFORE,        state_old,          ABORT,  DISCARDS)  \
+    X(with, TILT,          "tilt",          BEFORE,        tipped_over,        ABORT,  SCORED)    \
+    X(with, COMMAND,       "command",       BEFORE,        command_old,        ABORT,  DISCARDS)  \
+    X(with, SUPERVISOR,    "supervisor",    BEFORE,        may_not_fly,        ABORT,  DISCARDS)  \
+    X(with, LINK,          "link",          BEFORE,        link_down,          ABORT,  DISCARDS)  \
+    X(with, SETPOINT,      "setpoint",      BEFORE,        setpoint_old,       ABORT,  DISCARDS)  \
+    X(with, HOST,          "host",          BEFORE,        host_silent,        ABORT,  DISCARDS)  \
+    X(with, BATTERY,       "battery",       BEFORE,        battery_below,      ABORT,  DISCARDS)  \
+    X(with, FENCE,         "fence",         BEFORE,        outside_fence,      ABORT,  SCORED)    \
+    X(with, SPEED,         "speed",         BEFORE,        too_fast,           ABORT,  SCORED)    \
+    X(with, UNCERTAIN,     "uncertain",     BEFORE,        position_uncertain, ABORT,  DISCARDS)  \
+    X(with, TOO_CLOSE,     "too_close",     APPROACH,      too_close,          ABORT,  SCORED)    \
+    X(with, APPROACH_TIME, "approach_time", APPROACH,      approach_too_long,  ABORT,  SCORED)    \
+    /* after the trigger: nothing but contact, loss of all senses and the clock ends a flip */    \
+    X(with, CONTACT,       "contact",       FLIP | COAST,  contact,            ATTACH, SCORED)    \
+    X(with, HANG,          "hang",          FLIP | COAST,  hanging,            ATTACH, SCORED)    \
+    X(with, BLIND,         "blind",         FLIP,          inputs_lost,        CUT,    SCORED)    \
+    X(with, FLIP_TIME,     "flip_time",     FLIP,          flip_too_long,      CUT,    SCORED)    \
+    X(with, COAST_TIME,    "coast_time",    COAST,         coast_over,         CUT,    SCORED)    \
+    /* after an abort */                                                                          \
+    X(with, LOST,          "lost",          ABORTED,       unable_to_hover,    CUT,    SCORED)    \
+    X(with, LANDED,        "landed",        ABORTED,       landed,             CUT,    SCORED)    \
+    /* the trigger */                                                                             \
+    X(with, NO_POLICY,     "no_policy",     APPROACH,      no_policy,          HOLD,   DISCARDS)  \
+    X(with, ONE_SHOT,      "one_shot",      APPROACH,      has_triggered,      HOLD,   SCORED)    \
+    X(with, NOT_FRESH,     "not_fresh",     APPROACH,      not_this_tick,      HOLD,   SCORED)    \
+    X(with, CUE,           "cue",           APPROACH,      cue_invalid,        HOLD,   SCORED)
+// clang-format on
+
 typedef struct
 {
     const char *name;
     uint32_t    phases;
     condition_t when;
-    ivl_act_t   act;
+    uint8_t     act;  // ivl_act_t; a byte, so that a row stays one of four words
+    bool        discards;
 } row_t;
 
-// clang-format off
-static const row_t ROWS[] = {
-    [IVL_RULE_NONE]          = {"none",          0,                NULL,               IVL_ACT_NONE},
-    // to arm
-    [IVL_RULE_CONFIG]        = {"config",        IDLE,             not_configured,     IVL_ACT_REFUSE},
-    [IVL_RULE_BYPASS]        = {"bypass",        IDLE,             motors_bypassed,    IVL_ACT_REFUSE},
-    [IVL_RULE_REARM]         = {"rearm",         IDLE,             not_rearmed,        IVL_ACT_REFUSE},
-    [IVL_RULE_BATTERY_REST]  = {"battery_rest",  IDLE,             battery_below_rest, IVL_ACT_REFUSE},
-    // before the trigger: refuses to arm, later aborts
-    [IVL_RULE_STATE]         = {"state",         BEFORE,           state_old,          IVL_ACT_ABORT},
-    [IVL_RULE_TILT]          = {"tilt",          BEFORE,           tipped_over,        IVL_ACT_ABORT},
-    [IVL_RULE_COMMAND]       = {"command",       BEFORE,           command_old,        IVL_ACT_ABORT},
-    [IVL_RULE_SUPERVISOR]    = {"supervisor",    BEFORE,           may_not_fly,        IVL_ACT_ABORT},
-    [IVL_RULE_LINK]          = {"link",          BEFORE,           link_down,          IVL_ACT_ABORT},
-    [IVL_RULE_SETPOINT]      = {"setpoint",      BEFORE,           setpoint_old,       IVL_ACT_ABORT},
-    [IVL_RULE_HOST]          = {"host",          BEFORE,           host_silent,        IVL_ACT_ABORT},
-    [IVL_RULE_BATTERY]       = {"battery",       BEFORE,           battery_below,      IVL_ACT_ABORT},
-    [IVL_RULE_FENCE]         = {"fence",         BEFORE,           outside_fence,      IVL_ACT_ABORT},
-    [IVL_RULE_SPEED]         = {"speed",         BEFORE,           too_fast,           IVL_ACT_ABORT},
-    [IVL_RULE_UNCERTAIN]     = {"uncertain",     BEFORE,           position_uncertain, IVL_ACT_ABORT},
-    [IVL_RULE_TOO_CLOSE]     = {"too_close",     APPROACH,         too_close,          IVL_ACT_ABORT},
-    [IVL_RULE_APPROACH_TIME] = {"approach_time", APPROACH,         approach_too_long,  IVL_ACT_ABORT},
-    // after the trigger: nothing but contact, loss of all senses and the clock ends a flip
-    [IVL_RULE_CONTACT]       = {"contact",       FLIP | COAST,     contact,            IVL_ACT_ATTACH},
-    [IVL_RULE_HANG]          = {"hang",          FLIP | COAST,     hanging,            IVL_ACT_ATTACH},
-    [IVL_RULE_BLIND]         = {"blind",         FLIP,             inputs_lost,        IVL_ACT_CUT},
-    [IVL_RULE_FLIP_TIME]     = {"flip_time",     FLIP,             flip_too_long,      IVL_ACT_CUT},
-    [IVL_RULE_COAST_TIME]    = {"coast_time",    COAST,            coast_over,         IVL_ACT_CUT},
-    // after an abort
-    [IVL_RULE_LOST]          = {"lost",          ABORTED,          unable_to_hover,    IVL_ACT_CUT},
-    [IVL_RULE_LANDED]        = {"landed",        ABORTED,          landed,             IVL_ACT_CUT},
-    // the trigger
-    [IVL_RULE_NO_POLICY]     = {"no_policy",     APPROACH,         no_policy,          IVL_ACT_HOLD},
-    [IVL_RULE_ONE_SHOT]      = {"one_shot",      APPROACH,         has_triggered,      IVL_ACT_HOLD},
-    [IVL_RULE_NOT_FRESH]     = {"not_fresh",     APPROACH,         not_this_tick,      IVL_ACT_HOLD},
-    [IVL_RULE_CUE]           = {"cue",           APPROACH,         cue_invalid,        IVL_ACT_HOLD},
-};
-// clang-format on
+#define ROW(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = {name, phases, when, IVL_ACT_##act, discards},
+static const row_t ROWS[] = {RULES(ROW, )};
 
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_RULE_COUNT, "one row a rule");
 _Static_assert(IVL_RULE_COUNT <= 255, "a rule is logged in one byte");
 
 // first row of the table that names a phase: those before it need no look
+#define OR_FIRST(with, id, name, phases, when, act, discards) (((phases) & (with)) != 0u) ? (uint8_t)IVL_RULE_##id:
+#define FIRST_OF(phase)                                       (RULES(OR_FIRST, 1u << (phase))(uint8_t) IVL_RULE_COUNT)
 static const uint8_t FIRST[] = {
-    [IVL_PHASE_IDLE] = IVL_RULE_CONFIG,  [IVL_PHASE_READY] = IVL_RULE_STATE,   [IVL_PHASE_APPROACH] = IVL_RULE_STATE,
-    [IVL_PHASE_FLIP] = IVL_RULE_CONTACT, [IVL_PHASE_COAST] = IVL_RULE_CONTACT, [IVL_PHASE_ATTACHED] = IVL_RULE_COUNT,
-    [IVL_PHASE_DONE] = IVL_RULE_COUNT,   [IVL_PHASE_ABORTED] = IVL_RULE_LOST,
+    [IVL_PHASE_IDLE] = FIRST_OF(IVL_PHASE_IDLE),         [IVL_PHASE_READY] = FIRST_OF(IVL_PHASE_READY),
+    [IVL_PHASE_APPROACH] = FIRST_OF(IVL_PHASE_APPROACH), [IVL_PHASE_FLIP] = FIRST_OF(IVL_PHASE_FLIP),
+    [IVL_PHASE_COAST] = FIRST_OF(IVL_PHASE_COAST),       [IVL_PHASE_ATTACHED] = FIRST_OF(IVL_PHASE_ATTACHED),
+    [IVL_PHASE_DONE] = FIRST_OF(IVL_PHASE_DONE),         [IVL_PHASE_ABORTED] = FIRST_OF(IVL_PHASE_ABORTED),
 };
 _Static_assert(sizeof FIRST / sizeof FIRST[0] == (size_t)IVL_PHASE_COUNT, "one entry a phase");
 
@@ -283,7 +294,12 @@ static bool is_rule(ivl_rule_t rule)
 
 ivl_act_t ivl_guard_act(ivl_rule_t rule)
 {
-    return is_rule(rule) ? ROWS[rule].act : IVL_ACT_NONE;
+    return is_rule(rule) ? (ivl_act_t)ROWS[rule].act : IVL_ACT_NONE;
+}
+
+bool ivl_guard_discards(ivl_rule_t rule)
+{
+    return is_rule(rule) && ROWS[rule].discards;
 }
 
 bool ivl_guard_applies(ivl_rule_t rule, ivl_phase_t phase)

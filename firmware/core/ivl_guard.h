@@ -1,5 +1,6 @@
 /// @file ivl_guard.h
-/// Safety rules as a table: one row a rule says in which phases it applies, on what condition, and what follows.
+/// Safety rules as a table: one row a rule says in which phases it applies, on what condition, what follows, and whether
+/// a flight that it ended may be scored.
 /// None of them needs the host; none of them aborts a flip.  The phase table (ivl_phase.c) turns what follows into a phase.
 #ifndef IVL_GUARD_H
 #define IVL_GUARD_H
@@ -21,6 +22,10 @@ ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, const 
 
 /// What follows from a rule; IVL_ACT_NONE for IVL_RULE_NONE and for a number that is none.
 ivl_act_t ivl_guard_act(ivl_rule_t rule);
+
+/// True if a flight that this rule ended says nothing about its policy: it is discarded, not scored.  IVL_RULE_NONE is of that kind: somebody
+/// has asked for the end.
+bool ivl_guard_discards(ivl_rule_t rule);
 
 /// True if the row of this rule names this phase.
 bool ivl_guard_applies(ivl_rule_t rule, ivl_phase_t phase);

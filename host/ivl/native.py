@@ -6,6 +6,7 @@ numpy dtypes are built from that. The calls release the interpreter lock while t
 
 import ctypes
 import hashlib
+import itertools
 import os
 import weakref
 from collections.abc import Mapping
@@ -179,6 +180,12 @@ class NativeLibrary:
         """Name of a safety rule of the flight core."""
         return bytes(self._c.ivl_sil_rule_name(code)).decode()
 
+    def rules(self) -> Mapping[str, bool]:
+        """Safety rules of the flight core by number; true: a flight that it ended says nothing about its policy."""
+        discards = self._c.ivl_sil_rule_discards
+        codes = itertools.takewhile(lambda code: discards(code) >= 0, itertools.count())
+        return {self.rule_name(code): bool(discards(code)) for code in codes}
+
 
 class NativeModel:
     """A vehicle and a gear inside the library; immutable, may be used from several threads at once."""
@@ -340,6 +347,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_hover", c_int, (ptr, ptr, size, ptr, size, double, ptr, size)),
         ("ivl_sil_end_reason", ctypes.c_char_p, (c_int,)),
         ("ivl_sil_rule_name", ctypes.c_char_p, (c_int,)),
+        ("ivl_sil_rule_discards", c_int, (c_int,)),
         ("ivl_sil_layout", ctypes.POINTER(_CField), (c_int, u32p, u32p)),
         ("ivl_sil_wire_version", c_int, ()),
         ("ivl_sil_model_config", ctypes.c_uint32, (ptr, ptr)),

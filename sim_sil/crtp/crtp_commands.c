@@ -1,8 +1,8 @@
 /// @file crtp_commands.c
 /// Ports that move the vehicle: set-points (3, 7), high-level commander (8), localization (6).  A set-point is not answered; one of a wrong
 /// length, or with values that the vehicle refuses, is counted.
+#include "crtp_commands.h"
 #include "crtp_number.h"
-#include "crtp_server.h"
 
 static void floats(ivl_crtp_reader_t *r, float *values, int n)
 {

@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "crtp_log_value.h"
+#include "crtp_params.h"
+
 typedef union
 {
     uint8_t bytes[IVL_CRTP_VALUE_BYTES];

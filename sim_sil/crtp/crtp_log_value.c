@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "crtp_log_value.h"
 #include "crtp_number.h"
-#include "crtp_server.h"
 
 #define FETCH_HALF 8u
 

@@ -4,7 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "crtp_server.h"
+#include "crtp_log_value.h"
+#include "crtp_logs.h"
 
 typedef enum
 {

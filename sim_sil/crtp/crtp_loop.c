@@ -6,6 +6,7 @@
 #include <time.h>
 
 #include "crtp_control.h"
+#include "crtp_params.h"
 #include "crtp_udp.h"
 
 enum

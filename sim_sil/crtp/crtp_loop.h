@@ -4,7 +4,7 @@
 #define IVL_CRTP_LOOP_H
 #include <signal.h>
 
-#include "crtp_server.h"
+#include "crtp_dispatch.h"
 #include "crtp_session.h"
 
 typedef struct

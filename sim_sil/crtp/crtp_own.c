@@ -1,6 +1,6 @@
 /// @file crtp_own.c
 /// The server's own parameters and log variables: time and link faults.  Beside those of the vehicle in the same tables.
-#include "crtp_server.h"
+#include "crtp_own.h"
 
 #include <string.h>
 

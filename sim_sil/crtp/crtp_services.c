@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "crtp_server.h"
+#include "crtp_services.h"
 
 static const char FIRMWARE[] = "inverted landing SIL";
 static const char DEVICE[] = "ivl_sil";

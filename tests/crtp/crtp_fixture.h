@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "crtp/crtp_server.h"
+#include "crtp/crtp_dispatch.h"
 #include "fake_cf.h"
 #include "unity.h"
 

@@ -10,10 +10,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "app_ivl.h"
 #include "cf/cf_vehicle.h"
 #include "crtp/crtp_control.h"
+#include "crtp/crtp_dispatch.h"
 #include "crtp/crtp_model_file.h"
-#include "crtp/crtp_server.h"
 
 int LLVMFuzzerInitialize(int *argc, char ***argv);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);

@@ -3,13 +3,17 @@
 import io
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from rich.console import Console
 
-from ivl import World
+from ivl import World, native
+from ivl.errors import RolloutError
 from ivl.links import packets, truth
+from ivl.links.episode import check_abort
 from ivl.links.operators import ConsoleOperator, OperatorStopped, Seen
 from ivl.links.packets import Phase, Recording
 from ivl.links.truth import Resting
@@ -142,3 +146,32 @@ def test_take_off_is_counted_down_and_the_battery_is_named() -> None:
 
 def test_recorder_constants_are_those_of_the_firmware() -> None:
     assert int.from_bytes(b"IVLR", "little") == packets.RECORD_MAGIC
+
+
+def aborted(rule: str, reason: str = "") -> Any:
+    """What a vehicle remembers of an abort."""
+    return SimpleNamespace(aborted_by=rule, abort_reason=reason)
+
+
+@pytest.mark.parametrize("rule", native.library().rules())
+def test_an_abort_by_each_rule_is_scored_or_discarded_as_its_row_says(rule: str) -> None:
+    if native.library().rules()[rule]:
+        with pytest.raises(RolloutError, match=f"the vehicle aborted: {rule}$"):
+            check_abort(aborted(rule))
+    else:
+        check_abort(aborted(rule))
+
+
+def test_what_others_did_is_not_the_policy_s_fault() -> None:
+    rules = native.library().rules()
+    assert all(rules[name] for name in ("none", "state", "host", "uncertain"))
+    assert not any(rules[name] for name in ("too_close", "tilt", "approach_time"))
+    with pytest.raises(RolloutError, match="aborted: a person"):
+        check_abort(aborted("tilt", "a person"))
+    check_abort(aborted(""))
+
+
+def test_the_table_of_rules_is_told_to_its_end() -> None:
+    library = native.library()
+    assert list(library.rules()) == [library.rule_name(code) for code in range(len(library.rules()))]
+    assert library.rule_name(len(library.rules())) == "?"

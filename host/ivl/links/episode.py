@@ -12,16 +12,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ivl import native
 from ivl.errors import ConfigError, LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links.packets import Phase, Recording, Request
 from ivl.links.vehicle import Command, Snapshot, Vehicle
 from ivl.world import World
 
-OUTSIDE_RULES = frozenset(
-    ("none", "config", "bypass", "battery_rest", "supervisor", "link", "setpoint", "host", "battery", "uncertain")
-)
-"""Safety rules that say nothing about the policy that was flown; "none": somebody asked for the abort."""
 HEIGHT_M_MIN = 0.3
 _READY_S, _APPROACH_S, _IDLE_S = 5.0, 5.0, 3.0
 _AFTER_READY = (Phase.APPROACH, Phase.FLIP, Phase.COAST, Phase.ATTACHED, Phase.DONE, Phase.ABORTED)
@@ -117,10 +114,13 @@ class Episode:
 
 
 def check_abort(vehicle: Vehicle) -> None:
-    """Raise RolloutError if this flight was aborted for a reason that says nothing about its policy."""
+    """Raise RolloutError if this flight was aborted for a reason that says nothing about its policy.
+
+    Which rules are such reasons is a column of the flight core's table of rules.
+    """
     if vehicle.aborted_by and vehicle.abort_reason:
         raise RolloutError(f"aborted: {vehicle.abort_reason}")
-    if vehicle.aborted_by in OUTSIDE_RULES:
+    if native.library().rules().get(vehicle.aborted_by, False):
         raise RolloutError(f"the vehicle aborted: {vehicle.aborted_by}")
 
 
