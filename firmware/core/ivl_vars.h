@@ -31,6 +31,7 @@
     /* sources of the distance: see ivl_distance.h */                                                                                        \
     X(uint8_t, "ivl", "d_source", d_source, "1", 0, 3, 0, "0 known height, 1 formula, 2 filter, 3 ranging sensor")                           \
     X(uint8_t, "ivl", "d_predict", d_predict, "1", 0, 1, 0, "known height: 1 carries the sample on to the present tick")                     \
+    X(float, "ivl", "pose_latency", pose_latency_s, "s", 0.0, 0.2, 0.0, "known height: age of a position when it arrives, for d_predict")    \
     X(float, "ivl", "height_sigma", height_sigma_m, "m", 0.0, 1.0, 0.002, "known height: standard deviation of the distance")                \
     X(uint8_t, "ivl", "of_source", of_source, "1", 0, 1, 0, "OF_y from 0 velocity and distance, 1 the flow sensor")                          \
     X(float, "ivl", "d_sigma_max", d_sigma_norm_max, "1", 0.01, 10.0, 0.25, "a distance less certain than this part of itself is invalid")   \

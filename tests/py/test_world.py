@@ -124,7 +124,7 @@ def test_flown_start_reaches_the_approach_speed(world: ivl.World) -> None:
         ({"d_ceil_m": 0.5}, "d_ceil_m: value 0.5: start='at_trigger' needs it, others must not have it"),
         ({"threads": 0}, "threads: value 0 is out of range"),
         ({"threads": True}, "threads: value True is out of range"),
-        ({"speed_mps": [1.0, 2.0], "rrev_c_per_s": [1.0, 2.0, 3.0]}, "broadcast: speed_mps (2,), rrev_c_per_s (3,)"),
+        ({"speed_mps": [1.0, 2.0], "rrev_c_per_s": [1.0, 2.0, 3.0]}, "broadcast: speed_mps (2,), theta (3,)"),
     ],
 )  # fmt: skip
 def test_a_bad_argument_is_refused_with_its_range(world: ivl.World, arguments: dict[str, object], message: str) -> None:

@@ -39,8 +39,8 @@ def draw_last_landing(result: RunResult) -> list[Path]:
     trace = result.world.trace(
         chosen.speed_mps,
         chosen.angle_deg,
-        float(theta[0]),
-        float(theta[1]),
+        *theta.tolist(),
+        form=chosen.policy.form,
         seed=derive(chosen.seed + int(result.rollouts.trial[row]), Purpose.WORLD),
         stream=int(result.rollouts.stream[row]),
         start=chosen.start,

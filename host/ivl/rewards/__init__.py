@@ -55,6 +55,11 @@ class RewardChoice(BaseModel):
         own = REWARDS[info.data["name"]].options_type
         return options if isinstance(options, own) else own.model_validate(options)
 
+    @classmethod
+    def further_paths(cls) -> dict[str, bool]:
+        """Paths of the options that any reward has, as `yamlfile.paths` tells them."""
+        return {f"options.{name}": False for reward in REWARDS.values() for name in reward.options_type.model_fields}
+
     @property
     def reward(self) -> Reward:
         """The reward itself."""
