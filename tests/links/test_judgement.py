@@ -61,7 +61,7 @@ def recording_of(world: World, rrev_c_per_s: float, moment_y_Nmm: float) -> Reco
         rows[name] = flight[source]
     rows["w_B_radps"], rows["phase"] = flight.w_B_radps, flight.phase
     flips = np.flatnonzero(rows["phase"] == Phase.FLIP)
-    return Recording(1, 1, int(flips[0]) if len(flips) else None, 500.0, rows)
+    return Recording(1, 1, 0, int(flips[0]) if len(flips) else None, 500.0, rows)
 
 
 def test_outcome_of_a_recording_agrees_with_the_simulator(world: World) -> None:

@@ -22,7 +22,7 @@ def first(plan: Plan, n: int) -> Plan:
     return Plan(plan.theta[:n], plan.seed[:n], plan.stream[:n])
 
 
-@pytest.mark.parametrize("member", ["seq_in_force", "rrev_c_per_s", "moment_y_Nm"])
+@pytest.mark.parametrize("member", ["seq_in_force", "crc_in_force", "form_in_force"])
 def test_policy_is_not_flown_when_the_vehicle_echoes_another(
     server: SilProcess, vertical: Experiment, plan: Plan, monkeypatch: pytest.MonkeyPatch, member: str
 ) -> None:
@@ -46,12 +46,14 @@ def test_policy_is_not_flown_when_the_vehicle_echoes_another(
     assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"
 
 
-def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess, vertical: Experiment) -> None:
-    theta = np.array([[25.0, 8.0], [4.8, 8.0]])
+def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess) -> None:
+    settings = ["firmware.flip_moment_max=0.01", "policy.moment_y_Nmm.bounds=[0.0, 10.0]"]
+    weak = experiment.load("experiments/paper_vertical.yaml", settings)
+    theta = np.array([[4.8, 12.0], [4.8, 8.0]])
     plan = Plan(theta, np.zeros(2, dtype=np.uint64), np.arange(2, dtype=np.uint64))
-    with CrazyflieSource(server.uri, vertical) as source:
+    with CrazyflieSource(server.uri, weak) as source:
         refused, flown = source.fly(plan)
-    assert refused.discarded.startswith("vehicle: policy RREV_c 25")
+    assert refused.discarded.startswith("vehicle: policy RREV_c 4.8 1/s, M_yd 12 N mm")
     assert np.isnan(refused.outcomes["t_impact_s"][0])
     assert flown.discarded == ""
     assert flown.outcomes["triggered"][0] == 1
@@ -113,7 +115,7 @@ def test_vehicle_does_not_miss_its_host_when_commands_are_lost_one_after_the_oth
 
 
 def test_bounds_beyond_the_vehicle_are_refused_before_the_first_flight(server: SilProcess) -> None:
-    chosen = experiment.load("experiments/paper_vertical.yaml", ["policy.rrev_c_per_s.bounds=[0.0, 30.0]"])
-    with pytest.raises(RolloutError, match=r"policy bounds: RREV_c 0 \.\. 30"):
+    chosen = experiment.load("experiments/paper_vertical.yaml", ["firmware.flip_moment_max=0.01"])
+    with pytest.raises(RolloutError, match=r"policy bounds: .*moment_y_Nmm 0 \.\. 10\.65"):
         CrazyflieSource(server.uri, chosen)
     assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ivl import experiment
 from ivl.experiment import Experiment
 from ivl.links import crazyflie, preflight, sil, sites
 from ivl.links.clock import FINE, Clock, LockStep
@@ -120,13 +121,13 @@ def test_new_site_is_a_class_and_a_row(server: SilProcess, vertical: Experiment,
 
 
 @pytest.mark.usefixtures("hall")
-def test_site_hears_of_refusals_and_faults(
-    server: SilProcess, vertical: Experiment, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with CrazyflieSource(server.uri, vertical) as source:
+def test_site_hears_of_refusals_and_faults(server: SilProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = ["firmware.flip_moment_max=0.01", "policy.moment_y_Nmm.bounds=[0.0, 10.0]"]
+    weak = experiment.load("experiments/paper_vertical.yaml", settings)
+    with CrazyflieSource(server.uri, weak) as source:
         site = hall_of(source)
-        refused, _ = source.fly(plan_of((25.0, 8.0), GOOD))
-        assert refused.discarded.startswith("vehicle: policy RREV_c 25")
+        refused, _ = source.fly(plan_of((4.8, 12.0), GOOD))
+        assert refused.discarded.startswith("vehicle: policy RREV_c 4.8 1/s, M_yd 12 N mm")
         assert site.calls == ["ready", "prove", "start", "refusal", "start", "approach"]
         del site.calls[:]
         monkeypatch.setattr(site, "before_approach", lambda _: server.set("sil.vbat", 2.6))
