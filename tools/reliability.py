@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from ivl import campaign, experiment, native
+from ivl import experiment, native, run
 from ivl.errors import IvlError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
@@ -110,7 +110,7 @@ def rows_of(folder: Path) -> list[Rows]:
 
 def learn(chosen: Experiment, folder: Path, source: CrazyflieSource | WorldSource) -> None:
     """Learn, without judging what was learned."""
-    manifest = campaign.make_manifest(chosen, chosen.make_world())
+    manifest = run.make_manifest(chosen, chosen.make_world())
     with RunStore.create(
         folder, chosen.to_yaml(), manifest, native.library().outcome_dtype, layout_of(chosen)
     ) as store:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ivl import campaign, experiment
+from ivl import experiment, run
 from ivl.errors import ConfigError, LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import open_source
@@ -75,8 +75,8 @@ def test_outcomes_have_the_same_bits_when_numbers_are_not_of_single_precision(
 
 
 def test_learning_stores_the_same_bits_as_in_process(server: SilProcess, vertical: Experiment, tmp_path: Path) -> None:
-    campaign.run(vertical, tmp_path / "link", uri=server.uri)
-    campaign.run(vertical, tmp_path / "here")
+    run.run(vertical, tmp_path / "link", uri=server.uri)
+    run.run(vertical, tmp_path / "here")
     assert rows_of(tmp_path / "link") == rows_of(tmp_path / "here")
     journal = (tmp_path / "link" / "flights.jsonl").read_text().splitlines()
     assert len(journal) == vertical.budget
@@ -263,7 +263,7 @@ def test_landing_that_compares_worlds_may_be_discarded_before_there_is_a_run_fol
         return original(site, policy_seq)
 
     monkeypatch.setattr(Simulator, "outcome", fail_first)
-    campaign.run(vertical, tmp_path / "link", uri=server.uri)
+    run.run(vertical, tmp_path / "link", uri=server.uri)
     assert n_calls == 2 + vertical.budget
     assert len((tmp_path / "link" / "flights.jsonl").read_text().splitlines()) == vertical.budget
 
@@ -302,14 +302,14 @@ def test_ctrl_c_stops_cleanly_and_the_resumed_run_has_the_same_bits(
     assert server.get("ivl.phase") == 0
     n_flown = len((tmp_path / "link" / "flights.jsonl").read_text().splitlines())
     assert 4 <= n_flown < longer.budget
-    campaign.run(longer, tmp_path / "link", resume=True, uri=server.uri)
-    campaign.run(longer, tmp_path / "here")
+    run.run(longer, tmp_path / "link", resume=True, uri=server.uri)
+    run.run(longer, tmp_path / "here")
     assert rows_of(tmp_path / "link") == rows_of(tmp_path / "here")
 
 
 def test_nothing_is_created_when_the_vehicle_cannot_be_reached(vertical: Experiment, tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="no Crazyradio is plugged in"):
-        campaign.run(vertical, tmp_path / "run", uri="radio://0/80/2M/E7E7E7E7E7")
+        run.run(vertical, tmp_path / "run", uri="radio://0/80/2M/E7E7E7E7E7")
     assert not (tmp_path / "run").exists()
 
 

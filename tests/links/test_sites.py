@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ivl import experiment
+from ivl.errors import RolloutError
 from ivl.experiment import Experiment
 from ivl.links import crazyflie, preflight, sil, sites
 from ivl.links.clock import FINE, Clock, LockStep
@@ -43,6 +44,7 @@ class Hall:
 
     @staticmethod
     def make_clock(session: Session, visit: Visit) -> Clock:
+        del visit
         return LockStep(session, FINE)
 
     def make_ready(self, again: bool) -> None:
@@ -53,6 +55,7 @@ class Hall:
         yield preflight.tables(self._vehicle)
 
     def prove(self, fly: Callable[[Rollout], Outcome]) -> None:
+        del fly
         self.calls.append("prove")
 
     def leave(self) -> None:
@@ -61,6 +64,7 @@ class Hall:
         give_back_time(self._vehicle.clock, self._visit.options.say)
 
     def to_start(self, rollout: Rollout) -> Point:
+        del rollout
         self.calls.append("start")
         sil.reset(self._vehicle)
         self._vehicle.go_to(self._start_W_m, 3.0)
@@ -68,6 +72,7 @@ class Hall:
         return self._start_W_m
 
     def before_approach(self, rollout: Rollout) -> None:
+        del rollout
         self.calls.append("approach")
 
     def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
@@ -120,6 +125,10 @@ def test_new_site_is_a_class_and_a_row(server: SilProcess, vertical: Experiment,
     assert [path.name for path in (tmp_path / "recordings").iterdir()] == [f"{7:016x}-0.csv"]
 
 
+def open_the_door(_: Rollout) -> None:
+    raise RolloutError("a door opens")
+
+
 @pytest.mark.usefixtures("hall")
 def test_site_hears_of_refusals_and_faults(server: SilProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = ["firmware.flip_moment_max=0.01", "policy.moment_y_Nmm.bounds=[0.0, 10.0]"]
@@ -130,7 +139,7 @@ def test_site_hears_of_refusals_and_faults(server: SilProcess, monkeypatch: pyte
         assert refused.discarded.startswith("vehicle: policy RREV_c 4.8 1/s, M_yd 12 N mm")
         assert site.calls == ["ready", "prove", "start", "refusal", "start", "approach"]
         del site.calls[:]
-        monkeypatch.setattr(site, "before_approach", lambda _: server.set("sil.vbat", 2.6))
+        monkeypatch.setattr(site, "before_approach", open_the_door)
         (again,) = source.fly(plan_of(GOOD))
         assert site.calls == ["start", "fault"]
         assert hall_of(source) is not site, "each connection has a site of its own"
