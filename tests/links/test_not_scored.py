@@ -46,14 +46,12 @@ def test_policy_is_not_flown_when_the_vehicle_echoes_another(
     assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"
 
 
-def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess) -> None:
-    settings = ["firmware.flip_moment_max=0.01", "policy.moment_y_Nmm.bounds=[0.0, 10.0]"]
-    weak = experiment.load("experiments/paper_vertical.yaml", settings)
-    theta = np.array([[4.8, 12.0], [4.8, 8.0]])
+def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess, vertical: Experiment) -> None:
+    theta = np.array([[25.0, 8.0], [4.8, 8.0]])
     plan = Plan(theta, np.zeros(2, dtype=np.uint64), np.arange(2, dtype=np.uint64))
-    with CrazyflieSource(server.uri, weak) as source:
+    with CrazyflieSource(server.uri, vertical) as source:
         refused, flown = source.fly(plan)
-    assert refused.discarded.startswith("vehicle: policy RREV_c 4.8 1/s, M_yd 12 N mm")
+    assert refused.discarded.startswith("vehicle: policy constant: rrev_c_per_s: value 25.0 is out of range")
     assert np.isnan(refused.outcomes["t_impact_s"][0])
     assert flown.discarded == ""
     assert flown.outcomes["triggered"][0] == 1
@@ -115,7 +113,7 @@ def test_vehicle_does_not_miss_its_host_when_commands_are_lost_one_after_the_oth
 
 
 def test_bounds_beyond_the_vehicle_are_refused_before_the_first_flight(server: SilProcess) -> None:
-    chosen = experiment.load("experiments/paper_vertical.yaml", ["firmware.flip_moment_max=0.01"])
-    with pytest.raises(RolloutError, match=r"policy bounds: .*moment_y_Nmm 0 \.\. 10\.65"):
+    chosen = experiment.load("experiments/paper_vertical.yaml", ["firmware.flip_moment_max=0.005"])
+    with pytest.raises(RolloutError, match=r"policy bounds: rrev_c_per_s 0 \.\. 7, moment_y_Nmm 0 \.\. 10.65"):
         CrazyflieSource(server.uri, chosen)
     assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"
