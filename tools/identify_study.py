@@ -21,7 +21,7 @@ from ivl.flight import identify, importer
 from ivl.flight.log import Given
 from ivl.flight.store import Flights
 from ivl.links.crazyflie import CrazyflieSource
-from ivl.links.episode import Rollout
+from ivl.links.landing_flight import Rollout
 from ivl.links.options import Options
 from ivl.silproc import SilProcess
 

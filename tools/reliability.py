@@ -14,15 +14,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from ivl import campaign, experiment, native
+from ivl import experiment, native, run
 from ivl.errors import IvlError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
 from ivl.learning.loop import LearningRun
 from ivl.learning.recorder import SCORED
 from ivl.links.crazyflie import CrazyflieSource
-from ivl.links.fields import SilField
 from ivl.links.options import Options
+from ivl.links.sites.simulator import Simulator
 from ivl.silproc import SilProcess
 from ivl.source import WorldSource
 from ivl.store import RunStore
@@ -110,7 +110,7 @@ def rows_of(folder: Path) -> list[Rows]:
 
 def learn(chosen: Experiment, folder: Path, source: CrazyflieSource | WorldSource) -> None:
     """Learn, without judging what was learned."""
-    manifest = campaign.make_manifest(chosen, chosen.make_world())
+    manifest = run.make_manifest(chosen, chosen.make_world())
     with RunStore.create(
         folder, chosen.to_yaml(), manifest, native.library().outcome_dtype, layout_of(chosen)
     ) as store:
@@ -120,7 +120,7 @@ def learn(chosen: Experiment, folder: Path, source: CrazyflieSource | WorldSourc
 @contextmanager
 def striking(server: SilProcess, action: Action | None) -> Iterator[None]:
     """Let a fault strike in the air, in every so many landings; errors of the fault itself are raised at the end."""
-    original, n_landings = SilField.outcome, 0
+    original, n_landings = Simulator.outcome, 0
     threads: list[threading.Thread] = []
     errors: list[IvlError] = []
 
@@ -130,20 +130,20 @@ def striking(server: SilProcess, action: Action | None) -> Iterator[None]:
         except IvlError as error:
             errors.append(error)
 
-    def outcome(field: SilField, policy_seq: int) -> object:
+    def outcome(site: Simulator, policy_seq: int) -> object:
         nonlocal n_landings
         n_landings += 1
         if action is not None and n_landings % STRIKE_EVERY == STRIKE_EVERY // 2:
             threads.append(threading.Thread(target=strike, args=(action,)))
             threads[-1].start()
             time.sleep(STRIKE_S)
-        return original(field, policy_seq)
+        return original(site, policy_seq)
 
-    SilField.outcome = outcome
+    Simulator.outcome = outcome
     try:
         yield
     finally:
-        SilField.outcome = original
+        Simulator.outcome = original
         for thread in threads:
             thread.join()
     if errors:

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from ivl import assess, experiment, four_leg, native
-from ivl.campaign import make_manifest
 from ivl.layout import layout_of
 from ivl.learning.loop import LearningRun, trials_of
 from ivl.plots import style
+from ivl.run import make_manifest
 from ivl.source import WorldSource
 from ivl.store import RunStore
 

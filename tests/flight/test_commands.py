@@ -10,7 +10,7 @@ import pytest
 from logs import Truth, cfclient_text, habas_rows, habas_text, recording_text
 from test_formats import BLOCKS
 
-from ivl import campaign, cli, experiment, store
+from ivl import cli, experiment, run, store
 from ivl.flight import store as flights
 from ivl.seeds import Purpose, derive
 
@@ -201,7 +201,7 @@ def run_folder(truth: Truth, tmp_path: Path) -> Path:
     ]
     chosen = experiment.load("experiments/paper_vertical.yaml", settings)
     folder = tmp_path / "run"
-    campaign.run(chosen, folder)
+    run.run(chosen, folder)
     (folder / "recordings").mkdir()
     seed = derive(chosen.seed, Purpose.WORLD)
     for stream in (5, 2, 0):

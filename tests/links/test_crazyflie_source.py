@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ivl import campaign, experiment
+from ivl import experiment, run
 from ivl.errors import ConfigError, LinkError, RolloutError
 from ivl.experiment import Experiment
-from ivl.links import crazyflie, open_source
+from ivl.links import open_source
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.deadlines import Deadlines
-from ivl.links.episode import Rollout
-from ivl.links.fields import SilField
+from ivl.links.landing_flight import Rollout
 from ivl.links.options import Options
 from ivl.links.packets import Phase
+from ivl.links.sites.simulator import OtherWorld, Simulator
 from ivl.silproc import SilProcess
 from ivl.source import Plan, WorldSource
 
@@ -75,8 +75,8 @@ def test_outcomes_have_the_same_bits_when_numbers_are_not_of_single_precision(
 
 
 def test_learning_stores_the_same_bits_as_in_process(server: SilProcess, vertical: Experiment, tmp_path: Path) -> None:
-    campaign.run(vertical, tmp_path / "link", uri=server.uri)
-    campaign.run(vertical, tmp_path / "here")
+    run.run(vertical, tmp_path / "link", uri=server.uri)
+    run.run(vertical, tmp_path / "here")
     assert rows_of(tmp_path / "link") == rows_of(tmp_path / "here")
     journal = (tmp_path / "link" / "flights.jsonl").read_text().splitlines()
     assert len(journal) == vertical.budget
@@ -107,7 +107,7 @@ def test_recorder_is_read_whatever_the_landing_comes_to(
 def test_another_world_at_the_other_end_is_refused_and_named(vertical: Experiment) -> None:
     other = vertical.model_copy(update={"gear_set": "table1"})
     with SilProcess(other.make_world()) as server:
-        with pytest.raises(crazyflie.OtherWorld) as refused:
+        with pytest.raises(OtherWorld) as refused:
             CrazyflieSource(server.uri, vertical, Options(start_hint="ivl sil --experiment mine.yaml"))
         assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"
         with CrazyflieSource(server.uri, other) as source:
@@ -137,7 +137,7 @@ def test_run_stops_when_the_vehicle_comes_back_in_another_world(
         next(flight)
         port = int(server.uri.rpartition(":")[2])
         server.kill()
-        with SilProcess(other.make_world(), port=port), pytest.raises(crazyflie.OtherWorld):
+        with SilProcess(other.make_world(), port=port), pytest.raises(OtherWorld):
             next(flight)
 
 
@@ -237,33 +237,33 @@ def test_flight_is_discarded_and_flown_again_when_the_vehicle_goes_away_in_it(
 
 def strike_in_flight(patch: pytest.MonkeyPatch, striker: threading.Thread, struck: threading.Event) -> None:
     """Let the fault strike in the second landing, after its approach has begun."""
-    original, n_calls = SilField.outcome, 0
+    original, n_calls = Simulator.outcome, 0
 
-    def outcome(field: SilField, policy_seq: int) -> object:
+    def outcome(site: Simulator, policy_seq: int) -> object:
         nonlocal n_calls
         n_calls += 1
         if n_calls == 2:
             striker.start()
             struck.wait(30.0)
-        return original(field, policy_seq)
+        return original(site, policy_seq)
 
-    patch.setattr(SilField, "outcome", outcome)
+    patch.setattr(Simulator, "outcome", outcome)
 
 
 def test_landing_that_compares_worlds_may_be_discarded_before_there_is_a_run_folder(
     server: SilProcess, vertical: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original, n_calls = SilField.outcome, 0
+    original, n_calls = Simulator.outcome, 0
 
-    def fail_first(field: SilField, policy_seq: int) -> object:
+    def fail_first(site: Simulator, policy_seq: int) -> object:
         nonlocal n_calls
         n_calls += 1
         if n_calls == 1:
             raise LinkError("lost")
-        return original(field, policy_seq)
+        return original(site, policy_seq)
 
-    monkeypatch.setattr(SilField, "outcome", fail_first)
-    campaign.run(vertical, tmp_path / "link", uri=server.uri)
+    monkeypatch.setattr(Simulator, "outcome", fail_first)
+    run.run(vertical, tmp_path / "link", uri=server.uri)
     assert n_calls == 2 + vertical.budget
     assert len((tmp_path / "link" / "flights.jsonl").read_text().splitlines()) == vertical.budget
 
@@ -302,14 +302,14 @@ def test_ctrl_c_stops_cleanly_and_the_resumed_run_has_the_same_bits(
     assert server.get("ivl.phase") == 0
     n_flown = len((tmp_path / "link" / "flights.jsonl").read_text().splitlines())
     assert 4 <= n_flown < longer.budget
-    campaign.run(longer, tmp_path / "link", resume=True, uri=server.uri)
-    campaign.run(longer, tmp_path / "here")
+    run.run(longer, tmp_path / "link", resume=True, uri=server.uri)
+    run.run(longer, tmp_path / "here")
     assert rows_of(tmp_path / "link") == rows_of(tmp_path / "here")
 
 
 def test_nothing_is_created_when_the_vehicle_cannot_be_reached(vertical: Experiment, tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="no Crazyradio is plugged in"):
-        campaign.run(vertical, tmp_path / "run", uri="radio://0/80/2M/E7E7E7E7E7")
+        run.run(vertical, tmp_path / "run", uri="radio://0/80/2M/E7E7E7E7E7")
     assert not (tmp_path / "run").exists()
 
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from ivl import World, native
 from ivl.errors import RolloutError
 from ivl.links import packets, truth
-from ivl.links.episode import check_abort
+from ivl.links.landing_flight import check_abort
 from ivl.links.operators import ConsoleOperator, OperatorStopped, Seen
 from ivl.links.packets import Phase, Recording
 from ivl.links.truth import Resting

@@ -84,7 +84,7 @@ def test_outcome_that_does_not_belong_to_what_was_asked_is_not_scored(
 
         if damage == "another seed":
             # as an older write would do that arrives late
-            monkeypatch.setattr(source._field, "before_approach", lambda _: server.set("sil.seed_lo", 99))
+            monkeypatch.setattr(source._site, "before_approach", lambda _: server.set("sil.seed_lo", 99))
         else:
             monkeypatch.setattr(Session, "read_memory", garbled)
         with pytest.raises(RolloutError, match="discarded 1 times"):

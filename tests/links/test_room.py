@@ -14,7 +14,7 @@ from ivl.errors import ConfigError, LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import crazyflie, preflight, sil
 from ivl.links.crazyflie import CrazyflieSource
-from ivl.links.episode import Rollout, make_safe, start_point
+from ivl.links.landing_flight import Rollout, make_safe, start_point
 from ivl.links.operators import OperatorStopped, Seen
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Request
@@ -155,9 +155,9 @@ def test_vehicle_that_aborts_for_its_surroundings_is_not_scored(
     source: CrazyflieSource, server: SilProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 1)
-    field = source._field
-    assert field is not None
-    monkeypatch.setattr(field, "before_approach", lambda _: server.set("sil.vbat", 2.6))
+    site = source._site
+    assert site is not None
+    monkeypatch.setattr(site, "before_approach", lambda _: server.set("sil.vbat", 2.6))
     with pytest.raises(RolloutError, match="discarded 1 times"):
         next(source.fly(plan_of(GOOD)))
     assert source.n_discarded == 1
@@ -169,14 +169,14 @@ def test_locked_vehicle_is_refused_with_what_to_do(source: CrazyflieSource) -> N
     vehicle.pause(5.0)  # it has just landed, and looks for an emergency stop once it is ready again
     assert Supervisor.LOCKED in vehicle.supervisor()
     with pytest.raises(RolloutError, match="locked: switch it off and on again"):
-        source._field._make_fit()  # type: ignore[union-attr]
+        source._site._make_fit()  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("phase", [Phase.READY, Phase.APPROACH, Phase.FLIP])
 def test_vehicle_is_brought_down_and_disarmed_from_any_phase(source: CrazyflieSource, phase: Phase) -> None:
-    vehicle, field = vehicle_of(source), source._field
-    assert field is not None
-    start_W_m = field.to_start(GOOD)
+    vehicle, site = vehicle_of(source), source._site
+    assert site is not None
+    start_W_m = site.to_start(GOOD)
     vehicle.put_policy(forms.by_name("constant"), [4.8, 8.0])
     vehicle.ask_for(Command(Request.HOVER, start_W_m), (Phase.READY,), 5.0)
     if phase != Phase.READY:
@@ -191,9 +191,9 @@ def test_vehicle_is_brought_down_and_disarmed_from_any_phase(source: CrazyflieSo
 
 
 def test_hovering_vehicle_is_landed(source: CrazyflieSource) -> None:
-    vehicle, field = vehicle_of(source), source._field
-    assert field is not None
-    field.to_start(GOOD)
+    vehicle, site = vehicle_of(source), source._site
+    assert site is not None
+    site.to_start(GOOD)
     assert make_safe(vehicle) == "landed, disarmed"
     assert vehicle.position_W_m[2] < 0.1
 
@@ -228,8 +228,8 @@ def test_ctrl_c_in_the_air_lands_the_vehicle(server: SilProcess, vertical: Exper
     said: list[str] = []
     options = Options(operator=script, rehearse=True, say=said.append)
     source = CrazyflieSource(server.uri, vertical, options)
-    assert source._field is not None
-    source._field.before_approach = press  # type: ignore[method-assign]
+    assert source._site is not None
+    source._site.before_approach = press  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):
         next(source.fly(plan_of(GOOD)))
     source.close()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import ivl
-from ivl import campaign
+from ivl import run
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.plots import convergence, strobe, style
@@ -12,8 +12,8 @@ from ivl.world import rotation
 
 
 @pytest.fixture
-def result(small: Experiment, tmp_path: Path) -> campaign.RunResult:
-    return campaign.run(small, tmp_path / "run")
+def result(small: Experiment, tmp_path: Path) -> run.RunResult:
+    return run.run(small, tmp_path / "run")
 
 
 def is_picture(path: Path) -> bool:
@@ -21,19 +21,19 @@ def is_picture(path: Path) -> bool:
     return {".png": head.startswith(b"\x89PNG"), ".svg": b"<svg" in head, ".pdf": head.startswith(b"%PDF")}[path.suffix]
 
 
-def test_convergence_and_last_landing_are_drawn_into_the_run_folder(result: campaign.RunResult) -> None:
+def test_convergence_and_last_landing_are_drawn_into_the_run_folder(result: run.RunResult) -> None:
     files = [*convergence.draw_run(result), *strobe.draw_last_landing(result)]
     names = ["convergence.png", "convergence.svg", "last_landing.png", "last_landing.svg"]
     assert [file.name for file in files] == names
     assert all(file.parent == result.folder and is_picture(file) for file in files)
 
 
-def test_every_scored_rollout_has_exactly_one_colour(result: campaign.RunResult) -> None:
+def test_every_scored_rollout_has_exactly_one_colour(result: run.RunResult) -> None:
     masks = np.array(convergence.outcome_classes(result.rollouts))
     assert (masks.sum(axis=0) == (result.rollouts.status == "scored")).all()
 
 
-def test_equal_runs_give_equal_svg_files(result: campaign.RunResult, tmp_path: Path) -> None:
+def test_equal_runs_give_equal_svg_files(result: run.RunResult, tmp_path: Path) -> None:
     files = [
         convergence.draw(result.experiment, result.history, result.rollouts, [tmp_path / f"{k}.svg"]) for k in "ab"
     ]

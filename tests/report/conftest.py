@@ -10,7 +10,7 @@ import ivl  # isort: split
 
 from playwright.sync_api import Browser, Page, Request, Route, sync_playwright
 
-from ivl import campaign, experiment, report
+from ivl import experiment, report, run
 from ivl.landing import LandingSpec
 from ivl.sweep import config, folder, plan, store, work
 
@@ -61,9 +61,9 @@ def spec() -> LandingSpec:
 
 @pytest.fixture(scope="session")
 def learn_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    run = tmp_path_factory.mktemp("learn") / "run"
-    campaign.run(experiment.from_data(SMALL, "small.yaml"), run)
-    return run
+    path = tmp_path_factory.mktemp("learn") / "run"
+    run.run(experiment.from_data(SMALL, "small.yaml"), path)
+    return path
 
 
 @pytest.fixture(scope="session")
@@ -71,14 +71,14 @@ def sweep_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sweep of two gears, flown task by task in this process."""
     settings = ["speeds_mps=[1.0, 2.5]", "angles_deg=[30.0, 60.0, 90.0]", "budget=48", "keep_rollouts=false"]
     sweep = config.load_sweep("sweeps/smoke.yaml", settings, learner="ephe_robust")
-    run = tmp_path_factory.mktemp("sweep") / "run"
+    path = tmp_path_factory.mktemp("sweep") / "run"
     worlds = {gear: sweep.make_world(gear) for gear in sweep.gear_names()}
-    kept = folder.open_run(run, sweep, worlds, 32, resume=False)
+    kept = folder.open_run(path, sweep, worlds, 32, resume=False)
     for task in plan.plan(sweep, kept.task_size):
         done = work.run_task(sweep, worlds[task.gear], task)
-        store.write_part(run, task.number, {**done.parts, "tasks": work.record(task, done)})
+        store.write_part(path, task.number, {**done.parts, "tasks": work.record(task, done)})
     kept.close()
-    return run
+    return path
 
 
 @pytest.fixture(scope="session")

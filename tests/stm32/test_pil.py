@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 import ivl
-from ivl import campaign, experiment
+from ivl import experiment, run
 from ivl.cli import run as cli
 from ivl.errors import ConfigError, RolloutError
 from ivl.layout import layout_of
@@ -79,7 +79,7 @@ def test_learning_in_the_loop_ends_with_the_same_policy_bit_for_bit(tmp_path: Pa
 
 
 def _learn(chosen, source, folder):
-    manifest = campaign.make_manifest(chosen, chosen.make_world(), None)
+    manifest = run.make_manifest(chosen, chosen.make_world(), None)
     with RunStore.create(folder, chosen.to_yaml(), manifest, library().outcome_dtype, layout_of(chosen)) as store:
         LearningRun([chosen], source, store).run()
         return store.episodes(), store.rollouts()

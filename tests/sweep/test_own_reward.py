@@ -14,7 +14,7 @@ import pytest
 from pydantic import Field
 from small_sweep import fly, make
 
-from ivl import campaign, experiment, report
+from ivl import experiment, report, run
 from ivl.cli import run as command
 from ivl.experiment import Experiment
 from ivl.export.source import Choice, resolve
@@ -58,9 +58,9 @@ def test_a_run_learns_stores_resumes_and_reports(chosen: Experiment, own_reward:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        campaign.run(chosen, tmp_path / "cut", hooks=campaign.Hooks(on_episode=interrupt))
-    result = campaign.run(campaign.read_config(tmp_path / "cut")[0], tmp_path / "cut", resume=True)
-    whole = campaign.run(chosen, tmp_path / "whole")
+        run.run(chosen, tmp_path / "cut", hooks=run.Hooks(on_episode=interrupt))
+    result = run.run(run.read_config(tmp_path / "cut")[0], tmp_path / "cut", resume=True)
+    whole = run.run(chosen, tmp_path / "whole")
     assert result.rollouts.outcomes.tobytes() == whole.rollouts.outcomes.tobytes()
     expected = own_reward.score(result.rollouts.outcomes)
     assert (result.rollouts.reward == expected["total"]).all()
@@ -99,11 +99,11 @@ def test_a_sweep_has_the_terms_as_columns(own_reward: RewardChoice, tmp_path: Pa
 def test_a_reward_whose_terms_changed_is_not_resumed(
     chosen: Experiment, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    campaign.run(chosen, tmp_path / "run")
+    run.run(chosen, tmp_path / "run")
     renamed = Reward("feet", "", (Quantity("toes", "1", "toes"),), feet, FeetOptions)
     monkeypatch.setitem(REWARDS, "feet", renamed)
-    with pytest.raises(campaign.StoreError, match="the terms of its reward or the parameters of its policy changed"):
-        campaign.run(chosen, tmp_path / "run", resume=True)
+    with pytest.raises(run.StoreError, match="the terms of its reward or the parameters of its policy changed"):
+        run.run(chosen, tmp_path / "run", resume=True)
 
 
 def test_the_command_line_knows_it(capsys: pytest.CaptureFixture[str]) -> None:

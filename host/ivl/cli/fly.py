@@ -54,7 +54,7 @@ def fly(
     policy = policy_options.theta_of(chosen.policy.form, theta, rrev, moment)
     try:
         from ivl.links import crazyflie
-        from ivl.links.episode import Rollout
+        from ivl.links.landing_flight import Rollout
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
     tracker = mocap_config.load(mocap) if mocap else None

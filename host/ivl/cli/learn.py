@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ivl import campaign, experiment
+from ivl import experiment, run
 from ivl.cli import console
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
@@ -72,8 +72,8 @@ def learn(
 ) -> None:
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], out, resume)
-    folder = out or campaign.default_folder(chosen, n_trials, resume)
-    hooks = campaign.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage)
+    folder = out or run.default_folder(chosen, n_trials, resume)
+    hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage)
     flight = Options(
         mocap=mocap_config.load(mocap) if mocap else None,
         other_world=other_world,
@@ -81,7 +81,7 @@ def learn(
         say=console.say,
     )
     try:
-        result = campaign.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight)
+        result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight)
     except KeyboardInterrupt:
         console.err.print(
             f"interrupted; continue with: ivl learn --resume --out {folder}{f' --uri {uri}' if uri else ''}"
@@ -119,7 +119,7 @@ def _choose(
         raise ConfigError(
             "--resume without EXPERIMENT takes all from the run folder: leave out --set, --learner, --seed and --trials"
         )
-    return campaign.read_config(out)
+    return run.read_config(out)
 
 
 def _announce(folder: Path) -> None:
@@ -130,14 +130,14 @@ def _stage(stage: int, n_stages: int) -> None:
     console.err.print(f"judging: best possible policy, stage {stage + 1} of {n_stages}", highlight=False)
 
 
-def _draw(result: campaign.RunResult) -> list[Path]:
+def _draw(result: run.RunResult) -> list[Path]:
     """Pictures of a single run; matplotlib is loaded only here, it takes a second."""
     from ivl.plots import convergence, strobe
 
     return [*convergence.draw_run(result), *strobe.draw_last_landing(result)]
 
 
-def _report(result: campaign.RunResult, pictures: list[Path]) -> None:
+def _report(result: run.RunResult, pictures: list[Path]) -> None:
     summary, best = result.summary, result.best
     lines = _lines_of_trials(summary) if "trials" in summary else _lines_of_one(summary, result.experiment)
     best_text = (

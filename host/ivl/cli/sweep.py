@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn
 
-from ivl import campaign
+from ivl import run
 from ivl.cli import console
 
 HELP = """Learn over a grid of approaches and landing gears: run a sweep FILE.
@@ -123,7 +123,7 @@ def _run(
         size = task_size or plan.good_size(grid, workers or cluster.processors())
         _print(summary.of_plan(grid, size), as_json)
         return 0
-    run_folder = out or campaign.numbered_folder(base, resume)
+    run_folder = out or run.numbered_folder(base, resume)
     try:
         with _progress(run_folder) as on_standing:
             result = engine.run(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ivl import campaign, landing, native
+from ivl import landing, native, run
 from ivl.errors import ConfigError, StoreError
 from ivl.export.flight import Flight, of_file, of_spec
 from ivl.landing import LandingSpec
@@ -68,7 +68,7 @@ def resolve(source: Path, choice: Choice) -> Flight:
 def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str, RewardChoice]:
     """A rollout of a run of `ivl learn`: the one that was asked for, or that with the largest return."""
     _allow(choice, ("trial", "rollout"), f"{folder} is a run of `ivl learn`")
-    experiment, n_trials = campaign.read_config(folder)
+    experiment, n_trials = run.read_config(folder)
     trial = choice.trial or 0
     if trial >= (n_trials or 1):
         raise ConfigError(f"--trial {trial}: {folder} has trials 0 .. {(n_trials or 1) - 1}")

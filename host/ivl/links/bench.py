@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ivl import campaign, experiment, native
+from ivl import experiment, native, run
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
 from ivl.learning.loop import LearningRun
@@ -52,7 +52,7 @@ def _landings(chosen: Experiment) -> Plan:
 def _learn(chosen: Experiment, source: RolloutSource) -> float:
     """Learn once; returns the time that it took, s."""
     with tempfile.TemporaryDirectory() as folder:
-        manifest = campaign.make_manifest(chosen, chosen.make_world())
+        manifest = run.make_manifest(chosen, chosen.make_world())
         dtype = native.library().outcome_dtype
         with RunStore.create(Path(folder) / "run", chosen.to_yaml(), manifest, dtype, layout_of(chosen)) as store:
             began_s = time.monotonic()

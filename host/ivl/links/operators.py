@@ -7,11 +7,11 @@ from typing import Protocol
 from rich.console import Console
 from rich.prompt import Prompt
 
-from ivl.errors import RolloutError
+from ivl.links.landing_flight import FlyingEnds
 from ivl.links.truth import Resting
 
 
-class OperatorStopped(RolloutError):
+class OperatorStopped(FlyingEnds):
     """The operator wants no further flight; the run can be resumed."""
 
 

@@ -85,14 +85,14 @@ class Sil:
         self._vehicle.wait(lambda: bool(self._block.values.get("sil.ended")), _ENDED_S, "end of the landing")
         dtype, size = native.library().outcome_dtype, struct.calcsize(_HEADER)
         data = self._session.read_memory(self._memory, 0, size + dtype.itemsize, "outcome")
-        magic, episode, found_size, seq, crc = struct.unpack(_HEADER, data[:size])
+        magic, n_landing, found_size, seq, crc = struct.unpack(_HEADER, data[:size])
         if (magic, found_size, seq) != (_MAGIC, dtype.itemsize, policy_seq):
             raise LinkError(
-                f"outcome: landing {episode} of policy {seq} with {found_size} bytes (expected one of policy "
+                f"outcome: landing {n_landing} of policy {seq} with {found_size} bytes (expected one of policy "
                 f"{policy_seq}, {dtype.itemsize} bytes)"
             )
         if crc != zlib.crc32(self._draws + data[size:]):
-            raise LinkError(f"outcome: landing {episode}: its check sum is that of other random numbers, or bytes")
+            raise LinkError(f"outcome: landing {n_landing}: its check sum is that of other random numbers, or bytes")
         return np.frombuffer(data[size:], dtype=dtype).copy()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Motion capture as the host uses it: poses to the vehicle, and state for preflight, episode and people.
+"""Motion capture as the host uses it: poses to the vehicle, and state for preflight, landing and people.
 
 with Mocap(config, cf.extpos) as mocap:
     mocap.guard = LossGuard(lambda: vehicle.phase, abort)

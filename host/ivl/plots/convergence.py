@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
-from ivl.campaign import RunResult
 from ivl.experiment import Experiment
 from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
 from ivl.outcome import RECENT_EPISODES, clean, four_leg
 from ivl.plots import style
+from ivl.run import RunResult
 
 _SHOWN_MAX = 8  # parameters in the figure, the first of a longer form
 _FLOWN_COLOURS = (style.PURPLE, style.DIM)

@@ -15,10 +15,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from ivl.campaign import RunResult
 from ivl.learning.recorder import SCORED
 from ivl.outcome import four_leg
 from ivl.plots import style
+from ivl.run import RunResult
 from ivl.seeds import Purpose, derive
 from ivl.world import Trace, World, rotation
 

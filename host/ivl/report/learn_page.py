@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ivl import campaign, landing, native
+from ivl import landing, native, run
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
@@ -30,7 +30,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
     Raises:
         StoreError: The folder holds no run, nothing is finished, or another process is working on it.
     """
-    experiment, n_trials = campaign.read_config(folder)
+    experiment, n_trials = run.read_config(folder)
     with RunStore.open_existing(folder, native.library().outcome_dtype) as store:
         history, rollouts = store.episodes(), store.rollouts(trial=0)
     album, numbers = Album(experiment.reward), np.full(len(rollouts), -1)

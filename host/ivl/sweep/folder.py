@@ -11,9 +11,9 @@ from typing import Any
 
 import ivl
 from ivl import native, yamlfile
-from ivl.campaign import git_commit
 from ivl.errors import ConfigError, StoreError
 from ivl.layout import EMPTY, layout_of
+from ivl.run import git_commit
 from ivl.store import lock_folder, write_durably, write_json
 from ivl.sweep import schema, store
 from ivl.sweep.config import PolicyMap, Sweep

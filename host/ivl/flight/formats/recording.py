@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ivl import campaign, forms, native
+from ivl import forms, native, run
 from ivl.errors import ConfigError, IvlError
 from ivl.flight import table as border
 from ivl.flight.log import Format, Given, Log, with_rules
@@ -98,7 +98,7 @@ def _database(folder: Path) -> dict[str, dict[str, Any]]:
     """What was flown and what came of it, by the name of the recording, in the order flown."""
     result: dict[str, dict[str, Any]] = {}
     try:
-        experiment, n_trials = campaign.read_config(folder)
+        experiment, n_trials = run.read_config(folder)
         with RunStore.open_existing(folder, native.library().outcome_dtype) as store:
             rollouts = [store.rollouts(trial=trial) for trial in range(n_trials or 1)]
         record, _ = experiment.make_world().native_model.config()

@@ -2,13 +2,12 @@
 
     to the start point -> hover, policy confirmed -> approach -> (the vehicle decides) -> outcome
 
-The only two differences between a drone and a software vehicle are how it comes to the start point, and who knows the
-outcome; both are objects here (`Field`).
+What depends on where is flown, how the vehicle comes to the start point and who knows the outcome, is asked of a site.
 """
 
 import math
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +17,9 @@ from ivl.experiment import Experiment
 from ivl.links.packets import Phase, Recording, Request
 from ivl.links.vehicle import Command, Snapshot, Vehicle
 from ivl.world import World
+
+if TYPE_CHECKING:
+    from ivl.links.sites.base import Site
 
 HEIGHT_M_MIN = 0.3
 _READY_S, _APPROACH_S, _IDLE_S = 5.0, 5.0, 3.0
@@ -58,30 +60,18 @@ class Landing:
     battery_V: float
 
 
-class Field(Protocol):
-    """Where is flown: how the vehicle gets to its start point, and who knows what came of the landing."""
-
-    def to_start(self, rollout: Rollout) -> Point:
-        """Return when the vehicle hovers, not yet under the core's control; tells where the approach is to begin."""
-        ...
-
-    def before_approach(self, rollout: Rollout) -> None:
-        """Called in hover, with the policy in force."""
-        ...
-
-    def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
-        """Wait for the end of the landing and tell what came of it."""
-        ...
+class FlyingEnds(RolloutError):
+    """No further flight makes sense until a person has done something; the run can be resumed."""
 
 
-class Episode:
+class LandingFlight:
     """Flies landings of one experiment with one vehicle."""
 
     def __init__(self, vehicle: Vehicle, experiment: Experiment) -> None:
         """Fly the experiment's approach."""
         self.vehicle, self._experiment = vehicle, experiment
 
-    def fly(self, field: Field, rollout: Rollout) -> Landing:
+    def fly(self, site: "Site", rollout: Rollout) -> Landing:
         """Fly one landing.
 
         Raises:
@@ -91,16 +81,16 @@ class Episode:
         """
         vehicle = self.vehicle
         vehicle.begin_flight()
-        start_W_m = field.to_start(rollout)
+        start_W_m = site.to_start(rollout)
         battery_V = vehicle.battery_V
         vehicle.offer_policy(self._experiment.policy.shape, rollout.theta)
         vehicle.ask_for(Command(Request.HOVER, start_W_m), (Phase.READY,), _READY_S)
         policy_seq = vehicle.confirm_policy()
-        field.before_approach(rollout)
+        site.before_approach(rollout)
         experiment = self._experiment
         approach = Command(Request.APPROACH, start_W_m, experiment.speed_mps, math.radians(experiment.angle_deg))
         vehicle.ask_for(approach, _AFTER_READY, _APPROACH_S)
-        outcome, recording = field.outcome(policy_seq)
+        outcome, recording = site.outcome(policy_seq)
         self._check(policy_seq, outcome)
         return Landing(rollout, outcome, policy_seq, vehicle.snapshot(), recording, battery_V)
 

@@ -1,19 +1,28 @@
-"""Where is flown: the simulator's field, and a room with an operator in it."""
+"""A room with a ceiling, and an operator who places the vehicle and tells what came of a landing."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 
 from ivl.errors import RolloutError
-from ivl.experiment import Experiment
-from ivl.links import operators, sil
-from ivl.links.episode import Outcome, Point, Rollout, check_abort
-from ivl.links.operators import Operator
+from ivl.links import operators, preflight
+from ivl.links.clock import Clock, WallClock
+from ivl.links.landing_flight import (
+    Landing,
+    Outcome,
+    Point,
+    Rollout,
+    check_abort,
+    make_safe,
+    safe_or_why,
+    start_point,
+)
+from ivl.links.operators import ConsoleOperator
+from ivl.links.options import Options
 from ivl.links.packets import Phase, Recording, Request
-from ivl.links.tracking import Tracking
+from ivl.links.sites.base import Visit, give_back_time
+from ivl.links.tables import Session
 from ivl.links.truth import Resting, outcome_of_flight, suggest_legs
 from ivl.links.vehicle import Command, Supervisor, Vehicle
-from ivl.world import World
 
 CLIMB_MPS, TRAVEL_MPS = 0.5, 0.5
 NEAR_M = 0.1
@@ -21,80 +30,71 @@ NEAR_M = 0.1
 _SETTLE_S, _IDLE_S, _ARM_S, _END_S = 1.0, 3.0, 3.0, 30.0
 
 
-class SilField:
-    """A software vehicle: reset into the air, start and outcome by the simulator."""
-
-    def __init__(self, vehicle: Vehicle, experiment: Experiment, keep_recordings: bool = False) -> None:
-        """The vehicle must be a software vehicle (`sil.is_sil`)."""
-        self._vehicle, self._experiment, self._keep = vehicle, experiment, keep_recordings
-        self.extras = sil.Sil(vehicle)
-
-    def to_start(self, rollout: Rollout) -> Point:
-        """Reset; the simulator puts the vehicle to the start of each landing itself, when its approach begins."""
-        experiment = self._experiment
-        spec = sil.Spec(experiment.speed_mps, experiment.angle_deg, rollout.seed, rollout.stream, experiment.start)
-        return self.extras.reset(spec)
-
-    def before_approach(self, rollout: Rollout) -> None:
-        """Nothing: the start has been told with the reset."""
-
-    def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
-        """The simulator's truth."""
-        outcome = self.extras.wait_for_outcome(policy_seq)
-        if not self._keep:
-            return outcome, None
-        # the end of the cycle is also that of a recording which is not full yet
-        self._vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
-        return outcome, self._vehicle.recording(policy_seq)
-
-
-@dataclass(frozen=True)
-class Gate:
-    """What must hold before each take-off.
-
-    Attributes:
-        battery_V: Rest voltage below which the operator is asked for another battery.
-    """
-
-    battery_V: float = 3.7
-
-
 class Room:
-    """A drone under a real ceiling, and an operator who places it and tells what came of a landing."""
+    """A site where nobody knows more than recorder, cameras and operator see."""
 
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        world: World,
-        start_W_m: Point,
-        operator: Operator,
-        gate: Gate | None = None,
-        tracking: Tracking | None = None,
-        place: Callable[[Vehicle], None] | None = None,
-    ) -> None:
-        """A room.
+    def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
+        """Any vehicle.
 
-        Args:
-            vehicle: A drone, or a software vehicle in a rehearsal.
-            world: What is flown, for the geometry of legs and ceiling.
-            start_W_m: Where the approach begins.
-            operator: Who places the vehicle and confirms outcomes.
-            gate: What must hold before each take-off.
-            tracking: Motion capture; without it the vehicle's own estimate tells where it rests.
-            place: Does with a software vehicle what the operator's hands do with a drone.
+        Raises:
+            ConfigError: The approach does not fit under the ceiling.
         """
-        self._vehicle, self._world, self._start_W_m, self._operator = vehicle, world, start_W_m, operator
-        self._gate = gate or Gate()
-        self._tracking = tracking
-        self._place = place
+        self._vehicle, self._visit = vehicle, visit
+        self._world, self._tracking, self._say = visit.world, visit.tracking, visit.options.say
+        self._start_W_m = start_point(visit.world, visit.experiment)
+        self._operator = visit.options.operator or ConsoleOperator()
+
+    @staticmethod
+    def suits(session: Session, options: Options) -> bool:
+        """Every vehicle can be flown in a room."""
+        del session, options
+        return True
+
+    @staticmethod
+    def make_clock(session: Session, visit: Visit) -> Clock:
+        """Real time."""
+        del session, visit
+        return WallClock()
+
+    # ---- connection
+
+    def make_ready(self, again: bool) -> None:
+        """A vehicle that our own flight has left somewhere comes down first; another one is not touched."""
+        if again:
+            self._say(f"vehicle: {make_safe(self._vehicle)}")
+
+    def checks(self) -> Iterator[preflight.Check]:
+        """The whole preflight."""
+        return preflight.checks(self._vehicle)
+
+    def prove(self, fly: Callable[[Rollout], Outcome]) -> None:
+        """Nothing: nobody knows what must come of a landing."""
+
+    def leave(self) -> None:
+        """Down and disarmed; what was done is told."""
+        self._come_down()
+        give_back_time(self._vehicle.clock, self._say)
+
+    def _come_down(self) -> None:
+        self._say(f"vehicle: {safe_or_why(self._vehicle)}")
+
+    # ---- recovery
+
+    def after_refusal(self) -> None:
+        """Down: the next policy is flown from the floor."""
+        self._come_down()
+
+    def after_fault(self) -> None:
+        """Down first; then a new connection, to be sure."""
+        self._come_down()
+
+    # ---- a landing
 
     def to_start(self, rollout: Rollout) -> Point:
         """Ask the operator, arm, take off, fly to the start point."""
         del rollout
         vehicle = self._vehicle
-        self._operator.place(self._start_W_m)
-        if self._place is not None:
-            self._place(vehicle)
+        self._place()
         self._check_gate()
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         self._make_fit()
@@ -109,13 +109,17 @@ class Room:
         vehicle.pause(_SETTLE_S)
         return self._start_W_m
 
+    def _place(self) -> None:
+        """Return when the vehicle stands upright on the floor, and nobody is near."""
+        self._operator.place(self._start_W_m)
+
     def _check_gate(self) -> None:
         """Ask for another battery until one is good; a vehicle without power is a lost link, which the caller sees."""
         vehicle = self._vehicle
         if self._tracking is not None and (problems := self._tracking.problems()):
             raise RolloutError("; ".join(problems))
-        while not vehicle.battery_V >= self._gate.battery_V:
-            self._operator.change_battery(vehicle.battery_V, self._gate.battery_V)
+        while not vehicle.battery_V >= preflight.BATTERY_V_MIN:
+            self._operator.change_battery(vehicle.battery_V, preflight.BATTERY_V_MIN)
             vehicle.pause(0.5)
 
     def _make_fit(self) -> None:
@@ -162,6 +166,10 @@ class Room:
             raise RolloutError(f"discarded by the operator{f' (aborted: {why})' if aborted else ''}")
         outcome = outcome_of_flight(recording, vehicle.snapshot(), seen.n_legs, seen.body_contact, resting, self._world)
         return outcome, recording
+
+    def told(self, landing: Landing) -> str:
+        """What the operator has confirmed, and the battery that the landing began with."""
+        return f"flown: {int(landing.outcome['n_legs'][0])} legs hold, battery {landing.battery_V:.2f} V"
 
     def _is_over(self) -> bool:
         vehicle = self._vehicle

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 
 import ivl
-from ivl import campaign, cli, experiment, native, store
+from ivl import cli, experiment, native, run, store
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.store import RunStore
 
 
 def test_a_run_leaves_config_manifest_rollouts_and_result(small: Experiment, tmp_path: Path) -> None:
-    result = campaign.run(small, tmp_path / "run")
-    assert campaign.read_config(tmp_path / "run") == (small, None)
+    result = run.run(small, tmp_path / "run")
+    assert run.read_config(tmp_path / "run") == (small, None)
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     assert manifest["parameters"]["body.mass"] == {"value": 0.03584, "from": "habas2021.yaml"}
     assert manifest["units"]["out_t_impact_s"] == "s"
@@ -24,7 +24,7 @@ def test_a_run_leaves_config_manifest_rollouts_and_result(small: Experiment, tmp
 
 
 def test_the_summary_of_one_run_has_the_keys_that_scripts_rely_on(small: Experiment, tmp_path: Path) -> None:
-    summary = campaign.run(small, tmp_path / "run").summary
+    summary = run.run(small, tmp_path / "run").summary
     assert list(summary)[:7] == [
         "solved", "rollouts_to_convergence", "mu", "sigma",
         "landing_rate_four_leg", "landing_rate_clean", "failed_landings",
@@ -34,7 +34,7 @@ def test_the_summary_of_one_run_has_the_keys_that_scripts_rely_on(small: Experim
 
 
 def test_the_summary_agrees_with_what_was_flown(small: Experiment, tmp_path: Path) -> None:
-    result = campaign.run(small, tmp_path / "run")
+    result = run.run(small, tmp_path / "run")
     n_legs = result.rollouts.outcomes["n_legs"]
     assert result.summary["landing_rate_four_leg"] == pytest.approx((n_legs[-12:] >= 3).mean())
     assert result.summary["failed_landings_total"] == (n_legs < 3).sum()
@@ -42,7 +42,7 @@ def test_the_summary_agrees_with_what_was_flown(small: Experiment, tmp_path: Pat
 
 
 def test_trials_are_summarised_together(small: Experiment, tmp_path: Path) -> None:
-    result = campaign.run(small, tmp_path / "run", n_trials=3)
+    result = run.run(small, tmp_path / "run", n_trials=3)
     assert result.summary["trials"] == 3
     assert [v.trial for v in result.verdicts] == [0, 1, 2]
     assert len(result.rollouts) == 3 * small.budget
@@ -50,20 +50,20 @@ def test_trials_are_summarised_together(small: Experiment, tmp_path: Path) -> No
 
 def test_hooks_are_called_on_the_way(small: Experiment, tmp_path: Path) -> None:
     calls: list[str] = []
-    hooks = campaign.Hooks(
+    hooks = run.Hooks(
         on_start=lambda folder: calls.append(folder.name),
         on_episode=lambda progress: calls.append(f"episode {progress.episode}"),
         on_stage=lambda stage, n: calls.append(f"stage {stage} of {n}"),
     )
-    campaign.run(small, tmp_path / "run", hooks=hooks)
+    run.run(small, tmp_path / "run", hooks=hooks)
     assert calls == ["run"] + [f"episode {k}" for k in (1, 2, 3, 4)] + [f"stage {k} of 4" for k in range(4)]
 
 
 def test_resuming_a_finished_run_gives_the_same_result_and_flies_no_grid(small: Experiment, tmp_path: Path) -> None:
-    first = campaign.run(small, tmp_path / "run")
+    first = run.run(small, tmp_path / "run")
     stages: list[int] = []
-    hooks = campaign.Hooks(on_stage=lambda stage, _: stages.append(stage))
-    again = campaign.run(small, tmp_path / "run", resume=True, hooks=hooks)
+    hooks = run.Hooks(on_stage=lambda stage, _: stages.append(stage))
+    again = run.run(small, tmp_path / "run", resume=True, hooks=hooks)
     assert again.summary == first.summary
     assert stages == []
 
@@ -74,9 +74,9 @@ def test_an_interrupted_run_resumes_to_the_same_result(small: Experiment, tmp_pa
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        campaign.run(small, tmp_path / "cut", hooks=campaign.Hooks(on_episode=interrupt))
-    resumed = campaign.run(small, tmp_path / "cut", resume=True)
-    whole = campaign.run(small, tmp_path / "whole")
+        run.run(small, tmp_path / "cut", hooks=run.Hooks(on_episode=interrupt))
+    resumed = run.run(small, tmp_path / "cut", resume=True)
+    whole = run.run(small, tmp_path / "whole")
     assert resumed.rollouts.outcomes.tobytes() == whole.rollouts.outcomes.tobytes()
     assert {**resumed.summary, "run_dir": ""} == {**whole.summary, "run_dir": ""}
 
@@ -92,9 +92,9 @@ def test_an_interrupted_run_resumes_to_the_same_result(small: Experiment, tmp_pa
 def test_a_run_of_another_configuration_is_not_resumed(
     small: Experiment, tmp_path: Path, change: dict[str, int], n_trials: int | None, message: str
 ) -> None:
-    campaign.run(small, tmp_path / "run")
+    run.run(small, tmp_path / "run")
     with pytest.raises(StoreError, match=message):
-        campaign.run(small.model_copy(update=change), tmp_path / "run", n_trials, resume=True)
+        run.run(small.model_copy(update=change), tmp_path / "run", n_trials, resume=True)
 
 
 @pytest.mark.parametrize(
@@ -102,50 +102,50 @@ def test_a_run_of_another_configuration_is_not_resumed(
     [("library_sha256", "native library changed"), ("model_sha256", "vehicle or gear files changed")],
 )
 def test_a_run_whose_world_changed_is_not_resumed(small: Experiment, tmp_path: Path, key: str, message: str) -> None:
-    campaign.run(small, tmp_path / "run")
+    run.run(small, tmp_path / "run")
     path = tmp_path / "run" / "manifest.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), key: "other"}))
     with pytest.raises(StoreError, match=message):
-        campaign.run(small, tmp_path / "run", resume=True)
+        run.run(small, tmp_path / "run", resume=True)
 
 
 @pytest.mark.parametrize("command", [["learn", "--resume", "--out"], ["report"], ["export"]])
 def test_a_run_of_an_older_version_is_refused_in_one_line_that_names_both(
     small: Experiment, small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str]
 ) -> None:
-    run = tmp_path / "run"
-    campaign.run(small, run)
-    path = run / "manifest.json"
+    folder = tmp_path / "run"
+    run.run(small, folder)
+    path = folder / "manifest.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "schema_version": 1, "ivl_version": "0.0.9"}))
-    (run / "config.yaml").write_text("form: of old\n")
-    before = {file: file.read_bytes() for file in run.iterdir()}
-    assert cli.run([*command, str(run)]) != 0
-    line = f"{run}: written by ivl 0.0.9 with schema version 1; this is ivl {ivl.__version__}, which reads schema"
+    (folder / "config.yaml").write_text("form: of old\n")
+    before = {file: file.read_bytes() for file in folder.iterdir()}
+    assert cli.run([*command, str(folder)]) != 0
+    line = f"{folder}: written by ivl 0.0.9 with schema version 1; this is ivl {ivl.__version__}, which reads schema"
     complaint = capsys.readouterr().err
     assert f"{line} version {store.SCHEMA_VERSION} alone" in complaint
     assert len(complaint.splitlines()) == 1
-    assert {file: file.read_bytes() for file in run.iterdir()} == before
+    assert {file: file.read_bytes() for file in folder.iterdir()} == before
     with pytest.raises(StoreError, match=r"written by ivl 0\.0\.9"):
-        campaign.run(experiment.load(str(small_file)), run, resume=True)
+        run.run(experiment.load(str(small_file)), folder, resume=True)
 
 
 def test_a_run_flown_elsewhere_is_not_continued_in_the_simulator(small: Experiment, tmp_path: Path) -> None:
-    campaign.run(small, tmp_path / "run")
+    run.run(small, tmp_path / "run")
     path = tmp_path / "run" / "manifest.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "uri": "radio://0"}))
     with pytest.raises(StoreError, match="uri: it has radio://0, now None"):
-        campaign.run(small, tmp_path / "run", resume=True)
+        run.run(small, tmp_path / "run", resume=True)
 
 
 def test_a_run_is_not_overwritten(small: Experiment, tmp_path: Path) -> None:
-    campaign.run(small, tmp_path / "run")
+    run.run(small, tmp_path / "run")
     with pytest.raises(StoreError, match="holds a run already"):
-        campaign.run(small, tmp_path / "run")
+        run.run(small, tmp_path / "run")
 
 
 def test_resuming_where_nothing_is_says_so(small: Experiment, tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="there is no run to resume"):
-        campaign.run(small, tmp_path / "none", resume=True)
+        run.run(small, tmp_path / "none", resume=True)
 
 
 def test_default_folders_are_numbered_and_the_newest_is_resumed(
@@ -153,19 +153,19 @@ def test_default_folders_are_numbered_and_the_newest_is_resumed(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(StoreError, match="there is no run to resume; name its folder with --out"):
-        campaign.default_folder(small, None, resume=True)
-    first = campaign.default_folder(small, None, resume=False)
+        run.default_folder(small, None, resume=True)
+    first = run.default_folder(small, None, resume=False)
     assert first == Path("runs/small-ephe_robust-seed0")
     first.mkdir(parents=True)
-    second = campaign.default_folder(small, None, resume=False)
+    second = run.default_folder(small, None, resume=False)
     assert second == Path("runs/small-ephe_robust-seed0-2")
     second.mkdir()
-    assert campaign.default_folder(small, None, resume=True) == second
-    assert campaign.default_folder(small, 100, resume=False) == Path("runs/small-ephe_robust-seed0-x100")
+    assert run.default_folder(small, None, resume=True) == second
+    assert run.default_folder(small, 100, resume=False) == Path("runs/small-ephe_robust-seed0-x100")
 
 
 def test_a_run_can_be_read_with_sqlite_alone(small: Experiment, tmp_path: Path) -> None:
-    result = campaign.run(small, tmp_path / "run")
+    result = run.run(small, tmp_path / "run")
     with RunStore.open_existing(tmp_path / "run", native.library().outcome_dtype) as store:
         query = "SELECT count(*), avg(out_n_legs) FROM rollout WHERE status = 'scored'"
         assert store._db.execute(query).fetchone() == (16, np.mean(result.rollouts.outcomes["n_legs"]))

@@ -1,0 +1,116 @@
+"""What a site is: where a vehicle is flown, and all that depends on where.
+
+    make_clock -> (connect) -> make_ready, checks -> prove -> landings: to_start, before_approach, outcome -> leave
+
+A site belongs to one connection of a vehicle. Whoever flies asks it, and does not need to know what kind of site it is.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from ivl.errors import LinkError
+from ivl.experiment import Experiment
+from ivl.links.clock import Clock
+from ivl.links.landing_flight import Landing, Outcome, Point, Rollout
+from ivl.links.options import Options
+from ivl.links.packets import Recording
+from ivl.links.preflight import Check
+from ivl.links.tables import Session
+from ivl.links.tracking import Tracking
+from ivl.links.vehicle import Vehicle
+from ivl.world import World
+
+
+@dataclass(frozen=True)
+class Visit:
+    """What a vehicle comes to a site for.
+
+    Attributes:
+        experiment: What is flown.
+        world: Its world here.
+        options: How it is flown.
+        tracking: Motion capture that follows the vehicle; None: there is none of ours.
+        warn: Called with what a reader of the results has to know.
+    """
+
+    experiment: Experiment
+    world: World
+    options: Options
+    tracking: Tracking | None
+    warn: Callable[[str], None]
+
+
+class Site(Protocol):
+    """Where is flown.
+
+    Unless a method says otherwise, it may raise LinkError (the link is gone) and RolloutError (not now, and why).
+    """
+
+    def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
+        """The vehicle has been connected, and nothing has been asked of it yet."""
+        ...
+
+    @staticmethod
+    def suits(session: Session, options: Options) -> bool:
+        """Whether this is the site of a vehicle that is flown in this way."""
+        ...
+
+    @staticmethod
+    def make_clock(session: Session, visit: Visit) -> Clock:
+        """Who makes time pass for the vehicle there."""
+        ...
+
+    # ---- connection
+
+    def make_ready(self, again: bool) -> None:
+        """Bring the vehicle into the state that `checks` expect; `again`: what it does comes from our own flight."""
+        ...
+
+    def checks(self) -> Iterator[Check]:
+        """What must be right before anything is flown, beside policy bounds and motion capture."""
+        ...
+
+    def prove(self, fly: Callable[[Rollout], Outcome]) -> None:
+        """Try the vehicle with a landing of its own, if the site can tell what must come of it; called once."""
+        ...
+
+    def leave(self) -> None:
+        """Bring the vehicle down and leave it as it was found; what fails is told, not raised."""
+        ...
+
+    # ---- a landing
+
+    def to_start(self, rollout: Rollout) -> Point:
+        """Return when the vehicle hovers, not yet under the core's control; tells where the approach is to begin."""
+        ...
+
+    def before_approach(self, rollout: Rollout) -> None:
+        """Called in hover, with the policy in force."""
+        ...
+
+    def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
+        """Wait for the end of the landing and tell what came of it; the recording is stored, unless it is None."""
+        ...
+
+    def told(self, landing: Landing) -> str:
+        """What people are told of a landing that counts; empty: nothing."""
+        ...
+
+    # ---- recovery, each told and not raised
+
+    def after_refusal(self) -> None:
+        """The vehicle has refused a policy before its approach, and is asked for the next one."""
+        ...
+
+    def after_fault(self) -> None:
+        """A flight went wrong with the link still there; a new connection follows, if there is another attempt."""
+        ...
+
+
+def give_back_time(clock: Clock, say: Callable[[str], None]) -> None:
+    """Let a vehicle's time pass again, or it would stand still for whoever comes next; a failure is told."""
+    try:
+        clock.close()
+    except LinkError as error:
+        say(f"time of the vehicle not restored: {error}")
