@@ -22,7 +22,7 @@ def first(plan: Plan, n: int) -> Plan:
     return Plan(plan.theta[:n], plan.seed[:n], plan.stream[:n])
 
 
-@pytest.mark.parametrize("member", ["seq_in_force", "rrev_c_per_s", "moment_y_Nm"])
+@pytest.mark.parametrize("member", ["seq_in_force", "crc_in_force", "form_in_force"])
 def test_policy_is_not_flown_when_the_vehicle_echoes_another(
     server: SilProcess, vertical: Experiment, plan: Plan, monkeypatch: pytest.MonkeyPatch, member: str
 ) -> None:
@@ -51,7 +51,7 @@ def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess, vert
     plan = Plan(theta, np.zeros(2, dtype=np.uint64), np.arange(2, dtype=np.uint64))
     with CrazyflieSource(server.uri, vertical) as source:
         refused, flown = source.fly(plan)
-    assert refused.discarded.startswith("vehicle: policy RREV_c 25")
+    assert refused.discarded.startswith("host: form constant: rrev_c_per_s: value 25.0 is out of range")
     assert np.isnan(refused.outcomes["t_impact_s"][0])
     assert flown.discarded == ""
     assert flown.outcomes["triggered"][0] == 1

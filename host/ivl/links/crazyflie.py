@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ivl import native
-from ivl.errors import LinkError, RolloutError
+from ivl.errors import ArgumentError, LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight, sil
 from ivl.links.clock import COARSE, FINE, Clock, LockStep, WallClock
@@ -26,7 +26,7 @@ from ivl.links.options import Options
 from ivl.links.packets import Phase, Request
 from ivl.links.tables import Session
 from ivl.links.tracking import Tracking
-from ivl.links.vehicle import Command, PolicyRefused, Vehicle
+from ivl.links.vehicle import Command, OtherForms, PolicyRefused, Vehicle
 from ivl.outcome import Outcomes, valid
 from ivl.source import Flown, Plan
 
@@ -55,6 +55,7 @@ class CrazyflieSource:
             LinkError: The vehicle cannot be reached.
             RolloutError: It must not fly as it is; the message says why and what to do.
             OtherWorld: It simulates another world, and the options do not allow that.
+            OtherForms: It does not have the form of the experiment's policy.
         """
         check_uri(uri)
         self.uri, self._experiment, self.options = uri, experiment, options or Options()
@@ -156,12 +157,13 @@ class CrazyflieSource:
                 good = bool(valid(outcome).all())
                 reason = "" if good else f"simulation: {self.world.end_reason(int(outcome['end_reason'][0]))}"
                 return Flown(index, outcome, reason)
-            except PolicyRefused as error:
+            except (PolicyRefused, ArgumentError) as error:
                 self._note(rollout, f"refused: {error}")
                 if not self._is_sil and self._vehicle is not None:
                     self.options.say(f"vehicle: {safe_or_why(self._vehicle)}")
-                return Flown(index, _refused(), f"vehicle: {error}")
-            except (OperatorStopped, VehicleAway, OtherWorld):
+                who = "vehicle" if isinstance(error, PolicyRefused) else "host"
+                return Flown(index, _refused(), f"{who}: {error}")
+            except (OperatorStopped, VehicleAway, OtherWorld, OtherForms):
                 raise
             except LinkError as error:
                 self._discard(rollout, attempt, error)
@@ -222,6 +224,8 @@ class CrazyflieSource:
             raise RolloutError(f"{self.uri}: not fit to fly: {'; '.join(filter(None, problems))}")
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         vehicle.configure(self.world)
+        if not again:  # on the ground: a vehicle with other forms is told from ours before it takes off
+            vehicle.put_policy(self._experiment.policy.shape, self._experiment.policy.mu0)
         if self._tracking is not None:
             self._tracking.watch_over(vehicle)
         return vehicle

@@ -1,0 +1,77 @@
+"""The test forms of this folder in library, software vehicle and image of the chip, for a session of their own.
+
+The library is loaded once a process, so these tests run alone (`make test-forms`), with the builds named before `ivl`
+is imported.
+"""
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+BUILDS = {
+    "IVL_NATIVE_LIBRARY": ROOT / "build" / "release-tests-forms" / "libivl_sil.so",
+    "IVL_NATIVE_SERVER": ROOT / "build" / "release-tests-forms" / "ivl_sil",
+    "IVL_NATIVE_IMAGE": ROOT / "build" / "stm32-Os-tests-forms" / "tick_server.elf",
+}
+os.environ.update({name: str(path) for name, path in BUILDS.items()})
+
+import ivl  # isort: split  # noqa: E402 - sees the builds
+
+from ivl import experiment, native  # noqa: E402
+from ivl.experiment import Experiment  # noqa: E402
+
+sys.path[:0] = [str(ROOT / "tests" / "sweep")]
+assert ivl.__version__
+
+POLICY_SIX: dict[str, Any] = {
+    "form": "six",
+    "threshold_per_s": {"mu0": 4.8, "sigma0": 0.3, "bounds": [0.0, 7.0]},
+    "threshold_vz_per_m": {"mu0": 0.0, "sigma0": 0.1, "bounds": [-1.0, 1.0]},
+    "threshold_vx_per_m": {"mu0": 0.0, "sigma0": 0.1, "bounds": [-1.0, 1.0]},
+    "flip_Nmm": {"mu0": 8.0, "sigma0": 1.0, "bounds": [0.0, 10.0]},
+    "flip_vz_mNs": {"mu0": 0.0, "sigma0": 0.1, "bounds": [-1.0, 1.0]},
+    "flip_most_Nmm": {"mu0": 9.5, "sigma0": 0.3, "bounds": [0.0, 10.0]},
+}
+SIX: dict[str, Any] = {
+    "name": "six",
+    "doc": "A short run of a form of somebody else.",
+    "vehicle": "habas2021",
+    "gear": "wide_short",
+    "gear_set": "as_simulated",
+    "speed_mps": 2.5,
+    "angle_deg": 90.0,
+    "policy": POLICY_SIX,
+    "learner": {"name": "ephe_robust"},
+    "n_rollouts": 4,
+    "budget": 16,
+    "check": {"n_fresh": 10, "effort": 0.02},
+}
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _own_builds(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Whatever another session has loaded before is not what is tested here."""
+    missing = [str(path) for path in BUILDS.values() if not path.is_file()]
+    assert not missing, f"{missing[0]} is missing: run the tests by `make test-forms`, which compiles it"
+    assert native.library().path == BUILDS["IVL_NATIVE_LIBRARY"], "these tests need a process of their own"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="session")
+def six() -> Experiment:
+    """The form of six parameters, learned and judged within a second."""
+    return experiment.from_data(SIX, "six.yaml")
+
+
+@pytest.fixture
+def six_file(six: Experiment, tmp_path: Path) -> Path:
+    path = tmp_path / "six.yaml"
+    path.write_text(six.to_yaml())
+    return path
