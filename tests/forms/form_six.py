@@ -1,0 +1,27 @@
+"""An experiment with the form `six`, short enough for tests."""
+
+from typing import Any
+
+POLICY_SIX: dict[str, Any] = {
+    "form": "six",
+    "threshold_per_s": {"mu0": 4.8, "sigma0": 0.3, "bounds": [0.0, 7.0]},
+    "threshold_vz_per_m": {"mu0": 0.0, "sigma0": 0.1, "bounds": [-1.0, 1.0]},
+    "threshold_vx_per_m": {"mu0": 0.0, "sigma0": 0.1, "bounds": [-1.0, 1.0]},
+    "flip_Nmm": {"mu0": 8.0, "sigma0": 1.0, "bounds": [0.0, 10.0]},
+    "flip_vz_mNs": {"mu0": 0.0, "sigma0": 0.1, "bounds": [-1.0, 1.0]},
+    "flip_most_Nmm": {"mu0": 9.5, "sigma0": 0.3, "bounds": [0.0, 10.0]},
+}
+SIX: dict[str, Any] = {
+    "name": "six",
+    "doc": "A short run of a form of somebody else.",
+    "vehicle": "habas2021",
+    "gear": "wide_short",
+    "gear_set": "as_simulated",
+    "speed_mps": 2.5,
+    "angle_deg": 90.0,
+    "policy": POLICY_SIX,
+    "learner": {"name": "ephe_robust"},
+    "n_rollouts": 4,
+    "budget": 16,
+    "check": {"n_fresh": 10, "effort": 0.02},
+}
