@@ -11,12 +11,9 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-BUILDS = {
-    "IVL_NATIVE_LIBRARY": ROOT / "build" / "release-tests-forms" / "libivl_sil.so",
-    "IVL_NATIVE_SERVER": ROOT / "build" / "release-tests-forms" / "ivl_sil",
-    "IVL_NATIVE_IMAGE": ROOT / "build" / "stm32-Os-tests-forms" / "tick_server.elf",
-}
+sys.path.insert(0, str(Path(__file__).parent))
+from form_six import BUILDS, ROOT, SIX  # noqa: E402
+
 os.environ.update({name: str(path) for name, path in BUILDS.items()})
 
 import ivl  # isort: split  # noqa: E402 - sees the builds
@@ -24,9 +21,7 @@ import ivl  # isort: split  # noqa: E402 - sees the builds
 from ivl import experiment, native  # noqa: E402
 from ivl.experiment import Experiment  # noqa: E402
 
-sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests" / "sweep")]
-from form_six import SIX  # noqa: E402
-
+sys.path.insert(0, str(ROOT / "tests" / "sweep"))
 assert ivl.__version__
 
 

@@ -1,6 +1,14 @@
-"""An experiment with the form `six`, short enough for tests."""
+"""The builds with the forms of this folder, and an experiment with the form `six`, short enough for tests."""
 
+from pathlib import Path
 from typing import Any
+
+ROOT = Path(__file__).parents[2]
+BUILDS = {
+    "IVL_NATIVE_LIBRARY": ROOT / "build" / "release-tests-forms" / "libivl_sil.so",
+    "IVL_NATIVE_SERVER": ROOT / "build" / "release-tests-forms" / "ivl_sil",
+    "IVL_NATIVE_IMAGE": ROOT / "build" / "stm32-Os-tests-forms" / "tick_server.elf",
+}
 
 POLICY_SIX: dict[str, Any] = {
     "form": "six",

@@ -159,7 +159,7 @@ def test_a_trial_of_a_sweep_is_a_run_of_learn(swept: Path, tmp_path: Path) -> No
     sweep = make(tmp_path, **{**store.read_manifest(swept)["sweep"], "vary": {}})
     trials = store.read_frame(swept, "trials")
     row = trials.iloc[3]
-    chosen = sweep.experiment(str(row["gear"]), row["speed_mps"], row["angle_deg"], int(row["trial"]))
+    chosen = sweep.experiment(str(row["gear"]), float(row["speed_mps"]), float(row["angle_deg"]), int(row["trial"]))
     check = chosen.check.model_copy(update={"effort": 0.01, "n_fresh": 5})
     result = campaign.run(chosen.model_copy(update={"check": check}), tmp_path / "run")
     assert result.summary["mu"] == [row[f"mu_{name}"] for name in NAMES]
