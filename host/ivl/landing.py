@@ -57,6 +57,11 @@ class LandingSpec(Task):
         forms.by_name(self.form).to_si(self.theta)
         return self
 
+    @property
+    def policy(self) -> dict[str, float]:
+        """The parameters of the policy by the names that the form gives them."""
+        return dict(zip(forms.by_name(self.form).names, self.theta, strict=True))
+
     def fly(self, world: World | None = None, period_s: float = TRACE_PERIOD_S) -> tuple[World, Trace]:
         """Fly it and record the time series; a world that exists already saves building one."""
         world = world or self.make_world()
@@ -85,6 +90,9 @@ def _in_order(data: dict[str, Any]) -> dict[str, Any]:
         raise ValueError(f"theta: {given[0]} says it, too")
     if missing:
         raise ValueError(f"{missing[0]}: is missing (the form {form.name} has {', '.join(names)})")
+    for name in names:
+        if isinstance(data[name], bool) or not isinstance(data[name], (int, float)):
+            raise ValueError(f"{name}: value {data[name]!r} is not a number{yamlfile.number_hint(data[name])}")
     return {**{name: v for name, v in data.items() if name not in names}, "theta": [data[name] for name in names]}
 
 

@@ -12,14 +12,14 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from form_six import BUILDS, ROOT, SIX  # noqa: E402
+from form_six import BUILDS, ROOT, SIX
 
 os.environ.update({name: str(path) for name, path in BUILDS.items()})
 
-import ivl  # isort: split  # noqa: E402 - sees the builds
+import ivl  # isort: split
 
-from ivl import experiment, native  # noqa: E402
-from ivl.experiment import Experiment  # noqa: E402
+from ivl import experiment, native
+from ivl.experiment import Experiment
 
 sys.path.insert(0, str(ROOT / "tests" / "sweep"))
 assert ivl.__version__

@@ -16,6 +16,7 @@ from ivl import campaign, landing
 from ivl.analysis.policy import recommended
 from ivl.cli import run
 from ivl.experiment import Experiment
+from ivl.export.source import Choice, resolve
 from ivl.silproc import SilProcess
 from ivl.sweep import store, summary
 
@@ -112,6 +113,9 @@ def test_a_run_is_learned_reported_and_exported(capsys: Capture, six_file: Path,
         exported = printed(capsys, "export", str(folder), "--format", kind)
         assert exported["rows"] > 0
         assert Path(exported["files"][0]).stat().st_size > 0
+    facts = resolve(folder, Choice(rollout=3)).facts
+    assert facts["spec.form"] == "six"
+    assert [f"spec.{name}" in facts for name in NAMES] == [True] * 6
 
 
 def test_people_read_symbols_and_units_of_the_form(capsys: Capture, six_file: Path, tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_vehicle_does_not_miss_its_host_when_commands_are_lost_one_after_the_oth
 
 
 def test_bounds_beyond_the_vehicle_are_refused_before_the_first_flight(server: SilProcess) -> None:
-    chosen = experiment.load("experiments/paper_vertical.yaml", ["policy.rrev_c_per_s.bounds=[0.0, 30.0]"])
-    with pytest.raises(RolloutError, match=r"policy bounds: RREV_c 0 \.\. 30"):
+    chosen = experiment.load("experiments/paper_vertical.yaml", ["firmware.flip_moment_max=0.009"])
+    with pytest.raises(RolloutError, match=r"policy bounds: rrev_c_per_s 0 \.\. \S+, moment_y_Nmm 0 \.\. .*up to 9 N mm"):
         CrazyflieSource(server.uri, chosen)
     assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"

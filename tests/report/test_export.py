@@ -118,7 +118,7 @@ def test_the_file_tells_what_was_flown_and_what_came_out(mcap: Path, spec: Landi
     with mcap.open("rb") as file:
         (record,) = make_reader(file).iter_metadata()
     assert record.name == "landing"
-    assert float(record.metadata["spec.rrev_c_per_s"]) == spec.rrev_c_per_s
+    assert float(record.metadata["spec.rrev_c_per_s"]) == spec.policy["rrev_c_per_s"]
     assert record.metadata["outcome.n_legs"] == "4"
 
 
@@ -311,7 +311,7 @@ def recorder_table(rows: Any) -> str:
     table["t_s"], table["p_W_m"], table["v_W_mps"], table["q_WB"] = rows.t_s, rows.p_WB_m, rows.v_WB_mps, rows.q_WB
     table["w_B_radps"], table["d_ceil_m"], table["thrust_N"] = rows.w_B_radps, rows.d_sensed_m, rows.thrust_cmd_N
     table["phase"], table["f_B_mps2"] = rows.phase, [0.0, 0.0, 9.80665]
-    return Recording(1, 1, None, 500.0, table).to_csv()
+    return Recording(1, 1, 0, None, 500.0, table).to_csv()
 
 
 def test_a_flight_recorders_table_can_be_exported_too(tmp_path: Path, rows: Any) -> None:

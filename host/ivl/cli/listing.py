@@ -50,9 +50,9 @@ def list_(
         for entry in entries:
             label = f"{entry['gear_set']}/{entry['name']}" if "gear_set" in entry else entry["name"]
             console.out.print(f"  {label:40s} {entry['doc']}", highlight=False, soft_wrap=True)
-            for name, p in entry["parameters"].items() if kind is Kind.FORMS else ():
+            for key, p in entry["parameters"].items() if kind is Kind.FORMS else ():
                 told = f"{p['lo']:g} .. {p['hi']:g} {p['unit']}"
-                console.out.print(f"    {name:38s} {told:22s} {p['doc']}", highlight=False, soft_wrap=True)
+                console.out.print(f"    {key:38s} {told:22s} {p['doc']}", highlight=False, soft_wrap=True)
 
 
 def _entries(kind: Kind) -> list[dict[str, Any]]:
