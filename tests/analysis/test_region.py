@@ -16,7 +16,7 @@ def make_map(lands: Callable[..., np.ndarray]) -> pd.DataFrame:
     v, d, m = (a.ravel() for a in np.meshgrid([1.0, 2.0], [0.2, 0.3, 0.4], [2.0, 4.0, 6.0, 8.0, 10.0], indexing="ij"))
     vx, vz = 0 * v, v
     return pd.DataFrame(
-        {"speed_mps": v, "angle_deg": 90.0, "d_ceil_m": d, "moment_y_Nmm": m, "vx_mps": vx, "vz_mps": vz}
+        {"speed_mps": v, "angle_deg": 90.0, "d_ceil_m": d, "moment_Nmm": m, "vx_mps": vx, "vz_mps": vz}
         | {"rrev_per_s": vz / d, "of_y_radps": -vx / d, "n": 10, "n_four_leg": 10 * lands(v, d, m)}
     ).assign(vehicle="habas2021", gear_set="table1", gear="wide_short")
 
@@ -44,9 +44,9 @@ def test_a_state_lands_if_some_moment_does_and_knows_the_longest_run_of_them() -
     assert states["success"].sum() == 2
     chosen = states.loc[(1.0, 0.3)]
     assert (chosen["n_moments"], chosen["n_landing"]) == (5, 3)
-    assert (chosen["moment_low_Nmm"], chosen["moment_high_Nmm"], chosen["moment_y_Nmm"]) == (6.0, 8.0, 7.0)
-    assert states.loc[(2.0, 0.4), "moment_y_Nmm"] == 10.0
-    assert np.isnan(states.loc[(2.0, 0.2), "moment_y_Nmm"])
+    assert (chosen["moment_low_Nmm"], chosen["moment_high_Nmm"], chosen["moment_Nmm"]) == (6.0, 8.0, 7.0)
+    assert states.loc[(2.0, 0.4), "moment_Nmm"] == 10.0
+    assert np.isnan(states.loc[(2.0, 0.2), "moment_Nmm"])
 
 
 def test_a_moment_that_lands_too_rarely_does_not_count() -> None:

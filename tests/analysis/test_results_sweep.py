@@ -106,7 +106,7 @@ def test_a_file_without_its_marks_is_refused(tool: ModuleType, text: str) -> Non
 def test_real_run_folders_are_collected(tool: ModuleType, fly: Fly, tmp_path: Path) -> None:
     small = ["speeds_mps=[2.5, 4.0]", "angles_deg=[60.0, 90.0]", "gears=[wide_short]"]
     sweep = fly(config.load_sweep("sweeps/smoke.yaml", [*small, "budget=24"]), tmp_path / "sweep")
-    axes = ["d_ceil_m=[0.3, 0.5, 0.8]", "moment_y_Nmm=[6.0, 8.0, 10.0]", "n_rollouts=2"]
+    axes = ["d_ceil_m=[0.3, 0.5, 0.8]", "moment_Nmm=[6.0, 8.0, 10.0]", "n_rollouts=2"]
     chart = fly(config.load_map("sweeps/map.yaml", [*small, *axes]), tmp_path / "map")
     assert tool.main(["--data", str(tmp_path / "data"), "collect", str(sweep), "--map", str(chart)]) == 0
     data = tool.read(tmp_path / "data")

@@ -203,7 +203,7 @@ def recording_text(truth: Truth) -> str:
     ):  # fmt: skip
         for i, axis in enumerate(axes):
             rows[name][:, i] = truth[f"{stem}_{axis}{unit}"]
-    return Recording(1, 1, None, 100.0, rows).to_csv()
+    return Recording(1, 1, 0, None, 100.0, rows).to_csv()
 
 
 # ---- the Crazyflie's firmware

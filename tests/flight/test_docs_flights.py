@@ -41,8 +41,8 @@ def test_shipped_vehicle_has_what_was_identified() -> None:
 def test_the_experiment_draws_where_the_flights_landed() -> None:
     marks = experiment.load("experiments/paper_flight.yaml").flown
     landed = DATA["compared"]["now"]["windows"][0]["landed_threshold_per_s"]
-    assert marks[0].threshold_per_s == pytest.approx(landed)
-    assert (marks[1].threshold_per_s[0], marks[1].moment_Nmm[0]) == (4.0, 8.12)
+    assert marks[0].rrev_c_per_s == pytest.approx(landed)
+    assert (marks[1].rrev_c_per_s[0], marks[1].moment_y_Nmm[0]) == (4.0, 8.12)
 
 
 def test_readme_quotes_the_page() -> None:

@@ -51,9 +51,9 @@ def test_hanging_height_is_where_the_simulated_vehicle_comes_to_rest(world: Worl
     assert rows.d_ceil_m[-1] == pytest.approx(truth.hanging_gap_m(world), abs=0.02)
 
 
-def recording_of(world: World, rrev_c_per_s: float, moment_y_Nmm: float) -> Recording:
+def recording_of(world: World, threshold_per_s: float, moment_Nmm: float) -> Recording:
     """What an ideal recorder would hold of a simulated landing, without forces."""
-    flight = world.trace(2.5, 90.0, rrev_c_per_s, moment_y_Nmm, period_s=0.002).rows
+    flight = world.trace(2.5, 90.0, threshold_per_s, moment_Nmm, period_s=0.002).rows
     names = [("t_s", "f8", ()), ("p_W_m", "f8", (3,)), ("v_W_mps", "f8", (3,)), ("q_WB", "f8", (4,))]
     names += [("w_B_radps", "f8", (3,)), ("f_B_mps2", "f8", (3,)), ("phase", "u1", ())]
     rows = np.zeros(len(flight), dtype=names)
@@ -61,7 +61,7 @@ def recording_of(world: World, rrev_c_per_s: float, moment_y_Nmm: float) -> Reco
         rows[name] = flight[source]
     rows["w_B_radps"], rows["phase"] = flight.w_B_radps, flight.phase
     flips = np.flatnonzero(rows["phase"] == Phase.FLIP)
-    return Recording(1, 1, int(flips[0]) if len(flips) else None, 500.0, rows)
+    return Recording(1, 1, 0, int(flips[0]) if len(flips) else None, 500.0, rows)
 
 
 def test_outcome_of_a_recording_agrees_with_the_simulator(world: World) -> None:

@@ -25,7 +25,7 @@ VALUES = {
     },
     PacketType.READING: {"valid": 3, "age_s": 0.02, "rrev_per_s": 4.8, "of_y_radps": -math.inf},
     PacketType.POLICY_ECHO: {
-        "seq": 7, "status": -2, "seq_in_force": 6, "rrev_c_per_s": math.inf, "moment_y_Nm": -1.5,
+        "seq": 7, "status": -2, "missing": 0x8001, "seq_in_force": 6, "crc_in_force": 2**32 - 1, "form_in_force": 3,
     },
     PacketType.COMMAND_ECHO: {"seq": 1, "status": -3, "request": 3, "phase": 7, "rule": 28, "cause": 255},
     PacketType.CONFIG_ECHO: {"seq": 2**32 - 1, "status": -1, "bad": 255, "crc": 0xE9085006},
@@ -58,12 +58,14 @@ def test_decode_is_the_inverse_of_encode(kind: PacketType) -> None:
 @pytest.mark.parametrize("kind", list(PacketType), ids=lambda kind: kind.name)
 def test_bytes_of_another_size_version_or_type_are_no_packet(kind: PacketType) -> None:
     data = encode(kind, **VALUES[kind])
-    wrong = [data[:-1], data + b"\0", bytes((kind, 2)) + data[2:], bytes((0x7F, 1)) + data[2:], b"", data[:1]]
+    wrong = [data[:-1], data + b"\0", bytes((kind, 1)) + data[2:], bytes((0x7F, 2)) + data[2:], b"", data[:1]]
     assert [decode(item) for item in wrong] == [None] * len(wrong)
 
 
 def test_members_that_are_missing_unknown_or_too_large_are_refused() -> None:
-    with pytest.raises(ValueError, match="POLICY: members are seq, rrev_c_per_s, moment_y_Nm, not seq"):
+    with pytest.raises(
+        ValueError, match="POLICY: members are seq, crc, form, n, part, theta0, theta1, theta2, theta3, not seq"
+    ):
         encode(PacketType.POLICY, seq=1)
     with pytest.raises(ValueError, match="seq: value 65536 does not fit"):
         encode(PacketType.COMMAND, **{**VALUES[PacketType.COMMAND], "seq": 65536})
@@ -80,13 +82,15 @@ def test_numbers_of_phases_requests_status_and_types_are_those_of_the_flight_cor
     assert kinds == {kind.name: int(kind) for kind in PacketType}
     assert re.search(r"IVL_ERR_RANGE = -1.*IVL_ERR_PHASE = -2", types, re.DOTALL)
     assert "IVL_WIRE_ERR_NO_CONTROLLER = -3" in wire
-    assert [int(status) for status in Status] == [0, -1, -2, -3]
+    assert "IVL_ERR_FORM = -4" in types
+    assert re.search(r"IVL_WIRE_ERR_CRC = -5.*IVL_WIRE_ERR_INCOMPLETE = -6", wire, re.DOTALL)
+    assert [int(status) for status in Status] == [0, -1, -2, -3, -4, -5, -6]
 
 
 def test_recorder_header_of_another_version_is_refused() -> None:
     dtype = native.library().layout(native.LAYOUT_RECORD_HEADER)[1]
     header = np.zeros(1, dtype=dtype)
-    header["magic"], header["version"], header["row_size"] = packets.RECORD_MAGIC, 2, 44
+    header["magic"], header["version"], header["row_size"] = packets.RECORD_MAGIC, 1, 44
     with pytest.raises(LinkError, match="another version"):
         packets.record_header(header.tobytes())
 
@@ -95,7 +99,7 @@ def test_recorder_rows_come_in_si_units_and_survive_the_wrap_of_the_clock() -> N
     header_dtype = native.library().layout(native.LAYOUT_RECORD_HEADER)[1]
     row_dtype = native.library().layout(native.LAYOUT_RECORD_ROW)[1]
     header = np.zeros(1, dtype=header_dtype)
-    header["magic"], header["version"], header["row_size"] = packets.RECORD_MAGIC, 1, row_dtype.itemsize
+    header["magic"], header["version"], header["row_size"] = packets.RECORD_MAGIC, 2, row_dtype.itemsize
     header["n_rows"], header["trigger_row"], header["thrust_N_max"], header["tick_hz"] = 2, 1, 0.2, 500
     rows = np.zeros(2, dtype=row_dtype)
     rows["t_us"] = [2**32 - 1000, 1000]

@@ -67,7 +67,7 @@ def source(server: SilProcess, vertical: Experiment, script: Script, tmp_path: P
 
 
 def plan_of(*rollouts: Rollout) -> Plan:
-    theta = np.array([(r.rrev_c_per_s, r.moment_y_Nmm) for r in rollouts])
+    theta = np.array([r.theta for r in rollouts])
     return Plan(theta, np.zeros(len(theta), dtype=np.uint64), np.arange(len(theta), dtype=np.uint64))
 
 

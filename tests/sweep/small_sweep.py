@@ -30,7 +30,7 @@ MAP: dict[str, Any] = {
     **{name: SMALL[name] for name in ("doc", "vehicle", "gear_set", "gears", "speeds_mps", "angles_deg")},
     "name": "small_map",
     "d_ceil_m": [0.3, 0.6],
-    "moment_y_Nmm": [4.0, 7.0, 10.0],
+    "moment_Nmm": [4.0, 7.0, 10.0],
     "n_rollouts": 3,
 }
 

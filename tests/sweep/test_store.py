@@ -82,11 +82,18 @@ def test_a_map_s_points_are_what_a_direct_flight_gives(small_map: PolicyMap, tmp
     run = fly(small_map, tmp_path / "run", 1)
     frame, data = store.read_map(run), store.to_xarray(run, "map")
     assert len(frame) == 2 * 4 * 2 * 3
-    assert dict(data.sizes) == {"gear": 2, "speed_mps": 2, "angle_deg": 2, "d_ceil_m": 2, "moment_y_Nmm": 3}
+    assert dict(data.sizes) == {"gear": 2, "speed_mps": 2, "angle_deg": 2, "d_ceil_m": 2, "moment_Nmm": 3}
     for row in frame.sample(6, random_state=1).itertuples():
         world, stream = ivl.World(row.vehicle, row.gear, row.gear_set), row.first_stream + np.arange(3)
         out = world.rollouts(
-            row.speed_mps, row.angle_deg, 0.0, row.moment_y_Nmm, row.seed, "at_trigger", row.d_ceil_m, stream=stream
+            row.speed_mps,
+            row.angle_deg,
+            0.0,
+            row.moment_Nmm,
+            seed=row.seed,
+            start="at_trigger",
+            d_ceil_m=row.d_ceil_m,
+            stream=stream,
         )
         assert (row.n, row.n_four_leg) == (3, (out.n_legs >= 3).sum())
         assert row.n_legs_mean == pytest.approx(out.n_legs.mean())

@@ -80,7 +80,12 @@ def test_the_best_rollout_can_be_replayed_bit_for_bit(reference: Path) -> None:
     for row in table.sample(4, random_state=0).itertuples():
         world = ivl.World(row.vehicle, row.gear, row.gear_set)
         flight = world.trace(
-            row.speed_mps, row.angle_deg, row.best_rrev_c_per_s, row.best_moment_y_Nmm, row.seed, stream=row.best_stream
+            row.speed_mps,
+            row.angle_deg,
+            row.best_rrev_c_per_s,
+            row.best_moment_y_Nmm,
+            seed=row.seed,
+            stream=row.best_stream,
         )
         own = flown[(flown["seed"] == row.seed) & (flown["stream"] == row.best_stream)].iloc[0]
         assert flight.outcome.n_legs == row.best_n_legs == own["n_legs"]

@@ -16,6 +16,7 @@ from ivl.export.source import Choice, resolve
 from ivl.plots import campaign
 from ivl.report import sweep_page
 from ivl.report.landings import Album
+from ivl.rewards import RewardChoice
 from ivl.sweep import config, plan, schema, store, summary
 from ivl.sweep.config import Sweep
 
@@ -158,7 +159,7 @@ def test_a_page_tells_variants_apart_and_flies_their_landings_again_bit_for_bit(
 
 
 def test_an_album_keeps_worlds_apart_that_differ_in_sensing(run: Path) -> None:
-    sweep, trials, album = config.load_sweep(str(run / "sweep.yaml")), store.read_trials(run), Album()
+    sweep, trials, album = config.load_sweep(str(run / "sweep.yaml")), store.read_trials(run), Album(RewardChoice())
     specs = {sweep_page.best_landing(sweep, row).sensing for _, row in trials.iterrows()}
     assert specs == {"mocap", None}
     for _, row in trials.iterrows():

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ivl import native
-from ivl.errors import ArgumentError, LinkError, RolloutError
+from ivl.errors import LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight, sil
 from ivl.links.clock import COARSE, FINE, Clock, LockStep, WallClock
@@ -157,12 +157,11 @@ class CrazyflieSource:
                 good = bool(valid(outcome).all())
                 reason = "" if good else f"simulation: {self.world.end_reason(int(outcome['end_reason'][0]))}"
                 return Flown(index, outcome, reason)
-            except (PolicyRefused, ArgumentError) as error:
+            except PolicyRefused as error:
                 self._note(rollout, f"refused: {error}")
                 if not self._is_sil and self._vehicle is not None:
                     self.options.say(f"vehicle: {safe_or_why(self._vehicle)}")
-                who = "vehicle" if isinstance(error, PolicyRefused) else "host"
-                return Flown(index, _refused(), f"{who}: {error}")
+                return Flown(index, _refused(), f"vehicle: {error}")
             except (OperatorStopped, VehicleAway, OtherWorld, OtherForms):
                 raise
             except LinkError as error:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl import native
-from ivl.errors import LinkError, RolloutError
+from ivl.errors import ArgumentError, LinkError, RolloutError
 from ivl.forms import Form
 from ivl.links import recorder
 from ivl.links.clock import Clock, WallClock
@@ -351,10 +351,13 @@ class Vehicle:
             theta: Its parameters in the units of the form, shape (n,).
 
         Raises:
-            ArgumentError: theta is not one of the form.
+            PolicyRefused: theta is not one of the form: no vehicle would take it.
         """
         self._policy_seq = self._policy_seq % 0xFFFF_FFFE + 1
-        self._offer = Offer(self._policy_seq, form, theta)
+        try:
+            self._offer = Offer(self._policy_seq, form, theta)
+        except ArgumentError as error:
+            raise PolicyRefused(f"policy: {error}") from error
 
     def confirm_policy(self) -> int:
         """The number of the policy on offer, once the vehicle has said that this one is in force.
