@@ -171,7 +171,10 @@ AXIS = {"mu0": 5.0, "sigma0": 1.0, "bounds": [0.0, 7.0]}
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"moment_y_Nmm": None}, "policy.moment_y_Nmm: must be given (the form constant has rrev_c_per_s, moment_y_Nmm)"),
+        (
+            {"moment_y_Nmm": None},
+            "policy.moment_y_Nmm: must be given (the form constant has rrev_c_per_s, moment_y_Nmm)",
+        ),
         ({"flip_Nmm": AXIS}, "policy.flip_Nmm: no such field (the form constant has rrev_c_per_s, moment_y_Nmm)"),
         ({"form": "linear"}, "policy form 'linear' is unknown (allowed constant)"),
         ({"form": 3}, "policy.form: value 3"),
