@@ -4,8 +4,8 @@ import re
 from dataclasses import asdict
 from pathlib import Path
 
-from ivl import native
-from ivl.links import clock, fields, preflight, vehicle
+from ivl import native, silproc
+from ivl.links import clock, fields, pil, preflight, vehicle
 from ivl.links.deadlines import DEADLINES
 from ivl.links.episode import HEIGHT_M_MIN
 
@@ -38,3 +38,16 @@ def test_numbers_of_the_preflight_are_those_of_the_code() -> None:
     ):
         assert text in PAGE, text
     assert fields.Gate().battery_V == preflight.BATTERY_V_MIN
+
+
+def test_variables_of_the_environment_are_those_of_the_code() -> None:
+    told = re.findall(r"^\| `(IVL_\w+)` \| .* \| `([\w.-]+)`", PAGE, re.MULTILINE)
+    assert told == [
+        (native.LIBRARY_ENV, native.DEFAULT_LIBRARY.name),
+        (silproc.SERVER_ENV, silproc.DEFAULT_SERVER.name),
+        (pil.IMAGE_ENV, pil.IMAGE.name),
+        (pil.QEMU_ENV, pil.qemu_command(pil.IMAGE)[0]),
+    ]
+    package = Path(native.__file__).parent
+    used = {name for path in package.rglob("*.py") for name in re.findall(r'"(IVL_[A-Z_]+)"', path.read_text("utf-8"))}
+    assert used == {name for name, _ in told}
