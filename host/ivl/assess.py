@@ -3,10 +3,11 @@
 Definitions, the same for every learner:
 
 best rate: The largest four-leg rate that any policy reaches in this world. One or two parameters are searched by a
-    dense grid, which is sifted in stages (more rollouts for the better points); more of them by long searches of
-    CMA-ES from places of their own, whose ends lie where landings are, and then by clouds of policies around them,
-    sifted like the grid: in noise a search alone ends beside the best rate. Either way the last stage flies fresh
-    rollouts, so that the figure is not inflated by having been selected. `Best.search` says which it was.
+    dense grid, which is sifted in stages (more rollouts for the better points). More of them are searched by CMA-ES,
+    first from where the experiment begins, then from random places, which ends where landings are; and then by clouds
+    of policies around these ends, sifted like the grid, since in noise a search alone ends beside the best rate.
+    Either way the last stage flies fresh rollouts, so that the figure is not inflated by having been selected.
+    `Best.search` says which it was.
 check: After each episode the recommended policy flies `n_fresh` fresh rollouts (random numbers of the check alone).
 solved: The check after the last episode reaches `share_of_best` of the best rate (`ivl.outcome.solved`).
 converged at: The first multiple of N rollouts from which on every check reaches it.
@@ -179,10 +180,12 @@ def _search_long(flights: _Flights, on_stage: OnStage | None) -> Best:
         if on_stage:
             on_stage(stage, n_stages)
 
-    found = []
+    # what the experiment begins with may be good already, and of many parameters no search finds much in no time
+    begin = np.array(flights.experiment.policy.mu0)
+    found = [begin]
     for search in range(_SEARCHES):
         tell(search)
-        start = bounds.mean(axis=1) if search == 0 else rng.uniform(bounds[:, 0], bounds[:, 1])
+        start = begin if search == 0 else rng.uniform(bounds[:, 0], bounds[:, 1])
         found.append(_climb(flights, bounds, start, search))
     elite = np.array(found)
     for cloud in range(_CLOUDS):

@@ -1,5 +1,6 @@
-"""The builds with the forms of this folder, and an experiment with the form `six`, short enough for tests."""
+"""The builds with the forms of this folder, and experiments with them, short enough for tests."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,3 +34,10 @@ SIX: dict[str, Any] = {
     "budget": 16,
     "check": {"n_fresh": 10, "effort": 0.02},
 }
+
+
+def policy_most(names: Sequence[str]) -> dict[str, Any]:
+    """A policy of the form `most`, thresholds first, that lands where its search begins."""
+    threshold = {"mu0": 4.8, "sigma0": 0.3, "bounds": [0.0, 7.0]}
+    moment = {"mu0": 8.0, "sigma0": 1.0, "bounds": [0.0, 10.0]}
+    return {"form": "most", **dict.fromkeys(names[:-1], threshold), names[-1]: moment}

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from form_six import policy_most
 
-from ivl import assess, campaign, experiment
+from ivl import assess, campaign, experiment, forms
 from ivl.experiment import Experiment
 from ivl.learners import LEARNERS
 from ivl.links import pil
@@ -108,6 +109,13 @@ def test_the_best_policy_is_found_by_repeated_long_searches(six: Experiment, tmp
 def test_a_long_search_of_six_parameters_finds_a_landing_policy(six: Experiment) -> None:
     check = six.check.model_copy(update={"effort": 0.1})
     assert assess.find_best(six.make_world(), six.model_copy(update={"check": check})).rate_four_leg > 0.9
+
+
+def test_a_search_of_no_time_ends_no_worse_than_the_experiment_begins(six: Experiment) -> None:
+    """Of 64 parameters hardly any policy lands, and a few hundred rollouts find none."""
+    policy = policy_most(forms.by_name("most").names)
+    chosen = experiment.from_data(six.model_dump(mode="json") | {"policy": policy}, "most.yaml")
+    assert assess.find_best(chosen.make_world(), chosen).rate_four_leg > 0.9
 
 
 def test_a_long_search_reaches_the_rate_of_the_grid(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from form_six import BUILDS, ROOT
+from form_six import BUILDS, ROOT, policy_most
 
 from ivl import experiment, forms
 from ivl.experiment import Experiment
@@ -80,10 +80,7 @@ def test_it_is_in_force_once_with_its_checksum(most: Form, faults: dict[str, flo
 
 
 def test_it_lands_over_a_link_with_the_bits_of_this_process(six: Experiment, most: Form) -> None:
-    search = {p.name: {"mu0": 4.8, "sigma0": 0.3, "bounds": [0.0, 7.0]} for p in most.params}
-    search[most.names[-1]] = {"mu0": 8.0, "sigma0": 1.0, "bounds": [0.0, 10.0]}
-    data = six.model_dump(mode="json") | {"policy": {"form": "most", **search}}
-    chosen = experiment.from_data(data, "most.yaml")
+    chosen = experiment.from_data(six.model_dump(mode="json") | {"policy": policy_most(most.names)}, "most.yaml")
     theta = (*np.random.default_rng(2).uniform(4.0, 5.6, 63).tolist(), 8.0)
     with SilProcess(chosen.make_world()) as server, CrazyflieSource(server.uri, chosen) as source:
         server.set("fault.loss", 0.1)
