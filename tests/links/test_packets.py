@@ -16,20 +16,37 @@ from ivl.links.packets import PacketType, Phase, Request, Status, decode, encode
 CORE = Path(__file__).parents[2] / "firmware" / "core"
 VALUES = {
     PacketType.POLICY: {
-        "seq": 4_000_000_001, "crc": 3_000_000_001, "form": 1, "n": 6, "part": 1,
-        "theta0": 4.8, "theta1": 0.00815, "theta2": -1.0, "theta3": 0.0,
-    },  # fmt: skip
+        "seq": 4_000_000_001,
+        "crc": 3_000_000_001,
+        "form": 1,
+        "n": 6,
+        "part": 1,
+        "theta0": 4.8,
+        "theta1": 0.00815,
+        "theta2": -1.0,
+        "theta3": 0.0,
+    },
     PacketType.COMMAND: {
-        "seq": 65535, "request": 2, "hover_x_m": -0.25, "hover_y_m": 1.5, "hover_z_m": 0.7, "speed_mps": 2.2,
+        "seq": 65535,
+        "request": 2,
+        "hover_x_m": -0.25,
+        "hover_y_m": 1.5,
+        "hover_z_m": 0.7,
+        "speed_mps": 2.2,
         "angle_rad": math.radians(60.3),
     },
     PacketType.READING: {"valid": 3, "age_s": 0.02, "rrev_per_s": 4.8, "of_y_radps": -math.inf},
     PacketType.POLICY_ECHO: {
-        "seq": 7, "status": -2, "missing": 0x8001, "seq_in_force": 6, "crc_in_force": 2**32 - 1, "form_in_force": 3,
+        "seq": 7,
+        "status": -2,
+        "missing": 0x8001,
+        "seq_in_force": 6,
+        "crc_in_force": 2**32 - 1,
+        "form_in_force": 3,
     },
     PacketType.COMMAND_ECHO: {"seq": 1, "status": -3, "request": 3, "phase": 7, "rule": 28, "cause": 255},
     PacketType.CONFIG_ECHO: {"seq": 2**32 - 1, "status": -1, "bad": 255, "crc": 0xE9085006},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", list(PacketType), ids=lambda kind: kind.name)
