@@ -26,10 +26,11 @@ static void forget_senses(app_t *app)
 
 void app_begin_anew(void)
 {
-    app_t *const       app = &ivl_app;
-    const ivl_diag_t   diag = app->state.diag;
-    const ivl_policy_t policy = app->state.policy;
-    const bool         has_policy = app->state.has_policy;
+    static ivl_policy_t policy;  // too large for a stack of the drone
+    app_t *const        app = &ivl_app;
+    const ivl_diag_t    diag = app->state.diag;
+    const bool          has_policy = app->state.has_policy;
+    policy = app->state.policy;
     ivl_init(&app->cfg, &app->state);
     app->state.diag = diag;
     app->state.policy = policy;

@@ -58,12 +58,14 @@ void app_take_requests(app_t *app, uint64_t now_us)
         (void)app_put(&app->config_out, app_config_apply(app, config));
         atomic_store(&app->config_in.full, false);
     }
-    ivl_policy_t policy;
-    if (!atomic_load(&app->policy_out.full) && app_take(&app->policy_in, &policy))
+    if (!atomic_load(&app->policy_out.full) && atomic_load(&app->policy_in.full))
     {
-        const ivl_status_t           status = ivl_policy_commit(&app->cfg, &app->state, &policy);
+        // where it lies: a copy would be too large for the stack
+        const ivl_policy_t *const    policy = &app->policy_in.value;
+        const ivl_status_t           status = ivl_policy_commit(&app->cfg, &app->state, policy);
         const ivl_policy_id_t        now = app->state.policy.id;
-        const ivl_wire_policy_echo_t echo = {policy.id.seq, (int8_t)status, 0u, now.seq, now.crc, now.form};
+        const ivl_wire_policy_echo_t echo = {policy->id.seq, (int8_t)status, 0u, now.seq, now.crc, now.form};
+        atomic_store(&app->policy_in.full, false);
         (void)app_put(&app->policy_out, echo);
     }
     if (app_take(&app->command_in, &app->in.cmd))

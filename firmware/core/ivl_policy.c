@@ -1,8 +1,6 @@
 /// @file ivl_policy.c
 #include "ivl_policy.h"
 
-#include <string.h>
-
 #include "ivl_math.h"
 #include "ivl_wire.h"
 
@@ -19,7 +17,11 @@ uint32_t ivl_policy_crc(const ivl_policy_t *policy)
     {
         return 0u;
     }
-    uint32_t crc = ivl_wire_crc(0u, form->name, strlen(form->name));
+    uint32_t crc = 0u;
+    for (const char *at = form->name; *at != '\0'; at++)
+    {
+        crc = ivl_wire_crc(crc, at, 1u);
+    }
     for (uint32_t i = 0; i < policy->n; i++)
     {
         uint8_t bytes[4];

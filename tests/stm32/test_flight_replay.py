@@ -48,7 +48,7 @@ def test_policy_that_the_core_refuses_is_refused_by_the_chip(chips: pil.Chips, f
     messages = []
     for where in (None, chips):
         with pytest.raises(Exception, match="policy refused by the flight core") as refused:
-            replay.replay([changed(flights[0], threshold_per_s=25.0)], fixture.world(), where)
+            replay.replay([flights[0]], fixture.world(**{"firmware.flip_moment_max": 0.001}), where)
         messages.append(str(refused.value))
     assert messages[0] == messages[1]
 

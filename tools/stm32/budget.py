@@ -26,7 +26,7 @@ CLOCK_HZ = 168e6
 TICK_HZ = 500.0
 VEHICLE_BUILD = "stm32-Os"
 """Compiled as the vehicle's firmware is: the budget of the flash is that of this build."""
-LIMITS = {"flash_bytes": 16384, "ram_bytes": 2048, "stack_bytes": 512, "instructions_max": 3000, "cpu_percent": 2.0}
+LIMITS = {"flash_bytes": 18432, "ram_bytes": 2048, "stack_bytes": 512, "instructions_max": 3300, "cpu_percent": 2.0}
 MARGINS = {"flash_bytes": 0.03, "ram_bytes": 0.0, "stack_bytes": 0.05, "instructions_max": 0.05, "bound_max": 0.05}
 """Growth over the baseline that is accepted without an update of it."""
 _COUNTED_TICKS = 200_000
@@ -66,9 +66,20 @@ def _weigh(chip: cycles.Chip, parts: list[recording.Recording], program: Path) -
     for n, part in enumerate(parts):
         if n >= _WEIGHED_PARTS.start and all(len(tally.n) >= _WEIGHED_LEAST for tally in tallies.values()):
             break
-        for phase, tally in chip.run(part, program).items():
+        found = chip.run(part, program)
+        if n == 0:
+            _compare_counts(_counts(program, part), found)
+        for phase, tally in found.items():
             tallies[phase].add(tally)
     return tallies
+
+
+def _compare_counts(counts: dict[str, list[int]], tallies: dict[int, cycles.Tally]) -> None:
+    """Refuse figures of one recording on which the two ways to count instructions disagree."""
+    for number, name in enumerate(PHASES):
+        most, seen = counts[name][3], max(tallies[number].n, default=0)
+        if not seen <= most <= seen + _CALL_INSTRUCTIONS:
+            raise RuntimeError(f"phase {name}: the two ways to count instructions disagree: {seen} and {most}")
 
 
 def _phases(counts: dict[str, list[int]], tallies: dict[int, cycles.Tally]) -> dict[str, dict[str, float]]:
@@ -78,11 +89,9 @@ def _phases(counts: dict[str, list[int]], tallies: dict[int, cycles.Tally]) -> d
         tally = tallies[number]
         if n < _WEIGHED_LEAST or len(tally.n) < _WEIGHED_LEAST:
             raise RuntimeError(f"phase {name} hardly occurs in the recording: {n} and {len(tally.n)} ticks")
-        if max(tally.n) > most + _CALL_INSTRUCTIONS:
-            raise RuntimeError(f"phase {name}: the two ways to count instructions disagree: {max(tally.n)} and {most}")
         result[name] = {
             "instructions_mean": round(total / n, 1),
-            "instructions_max": most,
+            "instructions_max": max(most, *tally.n),
             "expected_mean": round(float(np.mean(tally.expected)), 1),
             "expected_max": max(tally.expected),
             "worst_max": max(tally.worst),
