@@ -121,7 +121,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 # longest first; some mostly compute, some mostly wait; test-wire flies in real time and has the machine for itself
-SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-report test-analysis test-flight test-physics sizes-diff
+SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-report test-forms test-analysis test-flight test-physics sizes-diff
 
 .PHONY: test
 test: setup-dev toolchain cross-toolchain chromium qt-libraries lint test-c san golden ## everything below, set-up and compilers included
@@ -193,6 +193,18 @@ test-links: setup-dev build ## flying over a link: the same bits as in process, 
 .PHONY: reliability
 reliability: setup-dev build ## learn over links that lose, delay, freeze and restart; writes docs/RELIABILITY.md (15 min)
 	@$(BIN)/python tools/reliability.py
+
+# which C tests know of forms; the image of the chip is that of `ivl learn --uri pil://`
+FORMS_TESTS    := test_ivl_policy test_ivl_parts test_ivl_wire test_ivl_fuzz
+FORMS_ON_STM32 := test_ivl_policy test_ivl_parts
+
+.PHONY: test-forms
+test-forms: setup-dev build toolchain cross-toolchain $(UNITY)/unity.c ## forms of a policy that no product file knows: learned, swept, reported, flown everywhere
+	$(say) 'test-forms: library, software vehicle and image with the forms of tests/forms, and their C tests'
+	@+$(NATIVE) FORMS=tests/forms lib sil $(FORMS_TESTS:%=run-%)
+	@+$(CROSS) FORMS=tests/forms build/stm32-Os-tests-forms/tick_server.elf $(FORMS_ON_STM32:%=run-%)
+	$(say) 'test-forms: pytest tests/forms'
+	@$(BIN)/python -m pytest tests/forms $(PYTEST_ARGS)
 
 .PHONY: test-wire
 test-wire: setup-dev build ## CRTP over a CAN bus, and motion capture
@@ -298,7 +310,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
 
 # set-up, each step once
 

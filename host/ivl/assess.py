@@ -3,9 +3,11 @@
 Definitions, the same for every learner:
 
 best rate: The largest four-leg rate that any policy reaches in this world. One or two parameters are searched by a
-    dense grid, which is refined in stages (more rollouts for the better points); more of them by long searches of
-    CMA-ES from places of their own, of which the best is taken. Either way the last stage flies fresh rollouts, so
-    that the figure is not inflated by having been selected. `Best.search` says which it was.
+    dense grid, which is sifted in stages (more rollouts for the better points). More of them are searched by CMA-ES,
+    first from where the experiment begins, then from random places, which ends where landings are; and then by clouds
+    of policies around these ends, sifted like the grid, since in noise a search alone ends beside the best rate.
+    Either way the last stage flies fresh rollouts, so that the figure is not inflated by having been selected.
+    `Best.search` says which it was.
 check: After each episode the recommended policy flies `n_fresh` fresh rollouts (random numbers of the check alone).
 solved: The check after the last episode reaches `share_of_best` of the best rate (`ivl.outcome.solved`).
 converged at: The first multiple of N rollouts from which on every check reaches it.
@@ -34,8 +36,12 @@ _STAGES = ((1.0, 8), (0.1, 64), (0.01, 400))
 _FINALISTS, _FINAL_ROLLOUTS = 10, 1000
 _GRID_STEPS = (140, 20)
 """Steps of each axis of the grid between the bounds of the policy, where an experiment gives no grid."""
-_SEARCHES, _GENERATIONS, _POPULATION = 8, 100, 64
+_SEARCHES, _GENERATIONS, _POPULATION = 8, 40, 64
 """Long searches where no grid can be flown: each begins elsewhere, and flies this many generations of rollouts."""
+_CLOUDS, _CLOUD, _CLOUD_SPREAD = 3, 320, 0.1
+"""Clouds around their results, policies of each, and standard deviation of the first as a share of the bounds."""
+_LEAD = 0.25
+"""What the largest return without a landing counts in a long search; a landing counts 1."""
 
 FloatArray = npt.NDArray[np.float64]
 OnStage = Callable[[int, int], None]
@@ -98,58 +104,124 @@ def find_best(
         threads: Worker threads; omitted: all processors.
         on_stage: Called with (stage, number of stages) before each.
     """
+    flights = _Flights(world, experiment, threads)
     if experiment.policy.shape.n > GRID_DIMENSIONS_MAX:
-        return _search_long(world, experiment, threads, on_stage)
-    check = experiment.check
+        return _search_long(flights, on_stage)
     theta = _grid(_axes(experiment))
-    landed, flown = np.zeros(len(theta)), np.zeros(len(theta))
-    chosen, stream = np.arange(len(theta)), 0
-    for stage, (share, n_full) in enumerate((*_STAGES, (0.0, _FINAL_ROLLOUTS))):
-        if on_stage:
-            on_stage(stage, len(_STAGES) + 1)
-        n_each = max(1, round(check.effort * n_full))
-        rate = landed[chosen] / np.maximum(flown[chosen], 1)
-        chosen = chosen[np.argsort(-rate, kind="stable")[: max(_FINALISTS, int(share * len(theta)))]]
-        four, spotless = _rates(world, experiment, theta[chosen], n_each, stream, threads)
-        landed[chosen] += four * n_each
-        flown[chosen] += n_each
-        stream += len(chosen) * n_each
+    chosen, four, spotless = _sift(flights, theta, (*_STAGES, (0.0, _FINAL_ROLLOUTS)), on_stage)
     top = int(np.argmax(four))  # of the fresh rollouts of the last stage alone
     words = f"grid of {len(theta)} policies"
-    return Best(tuple(theta[chosen[top]].tolist()), float(four[top]), float(spotless[top]), stream, words)
+    return Best(tuple(chosen[top].tolist()), float(four[top]), float(spotless[top]), flights.n_flown, words)
 
 
-def _search_long(world: World, experiment: Experiment, threads: int | None, on_stage: OnStage | None) -> Best:
-    """Searches of CMA-ES, the first from the middle of the bounds, the others from random places within them."""
-    bounds = np.array(experiment.policy.bounds)
-    rng = np.random.Generator(np.random.PCG64(derive(experiment.seed, Purpose.GRID)))
-    n_generations, stream, found = max(1, round(experiment.check.effort * _GENERATIONS)), 0, []
-    for search in range(_SEARCHES):
-        if on_stage:
-            on_stage(search, _SEARCHES + 1)
-        start = bounds.mean(axis=1) if search == 0 else rng.uniform(bounds[:, 0], bounds[:, 1])
-        learner = make_learner(
-            "cmaes", start, np.ptp(bounds, axis=1) / 5.0, bounds=bounds, n_rollouts=_POPULATION, seed=search
+class _Flights:
+    """Rollouts of the search, none with the random numbers of another."""
+
+    def __init__(self, world: World, experiment: Experiment, threads: int | None) -> None:
+        self.world, self.experiment, self._threads = world, experiment, threads
+        self.n_flown = 0
+
+    def scaled(self, n: int) -> int:
+        """A number of rollouts, or of generations of them, by the effort of the experiment."""
+        return max(1, round(self.experiment.check.effort * n))
+
+    def outcomes(self, theta: FloatArray, n_each: int) -> Outcomes:
+        """Fly each policy with `n_each` fresh random numbers, shape (m, n_each)."""
+        stream = self.n_flown + np.arange(len(theta) * n_each).reshape(len(theta), n_each)
+        self.n_flown += stream.size
+        experiment = self.experiment
+        return self.world.rollouts(
+            experiment.speed_mps,
+            experiment.angle_deg,
+            *by_parameter(theta[:, None]),
+            form=experiment.policy.form,
+            seed=derive(experiment.seed, Purpose.GRID),
+            stream=stream,
+            start=experiment.start,
+            threads=self._threads,
         )
-        for _ in range(n_generations):
-            if learner.stop():
-                break
-            theta = learner.ask()
-            outcomes = _fly(world, experiment, theta, stream + np.arange(len(theta))[:, None], threads)[:, 0]
-            meta = {name: outcomes[name] for name in outcomes.dtype.names or ()}
-            learner.tell(theta, experiment.reward.score(outcomes)[TOTAL], meta)
-            stream += len(theta)
-        found.append(np.clip(learner.result.recommended, bounds[:, 0], bounds[:, 1]))
-    if on_stage:
-        on_stage(_SEARCHES, _SEARCHES + 1)
-    n_final = max(1, round(experiment.check.effort * _FINAL_ROLLOUTS))
+
+    def rates(self, theta: FloatArray, n_each: int) -> tuple[FloatArray, FloatArray]:
+        """Four-leg and clean rate of each policy over `n_each` rollouts, shape (m,) each."""
+        outcomes = self.outcomes(theta, n_each)
+        return four_leg(outcomes).mean(axis=1), clean(outcomes).mean(axis=1)
+
+
+def _sift(
+    flights: _Flights, theta: FloatArray, stages: Sequence[tuple[float, int]], on_stage: OnStage | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Fly all policies a few times, the better ones more often, and so on.
+
+    Returns:
+        The policies of the last stage, and their four-leg and clean rate in it alone.
+    """
+    landed, flown, chosen = np.zeros(len(theta)), np.zeros(len(theta)), np.arange(len(theta))
+    four = spotless = landed
+    for stage, (share, n_full) in enumerate(stages):
+        if on_stage:
+            on_stage(stage, len(stages))
+        n_each = flights.scaled(n_full)
+        rate = landed[chosen] / np.maximum(flown[chosen], 1)
+        chosen = chosen[np.argsort(-rate, kind="stable")[: max(_FINALISTS, int(share * len(theta)))]]
+        four, spotless = flights.rates(theta[chosen], n_each)
+        landed[chosen] += four * n_each
+        flown[chosen] += n_each
+    return theta[chosen], four, spotless
+
+
+def _search_long(flights: _Flights, on_stage: OnStage | None) -> Best:
+    """Searches of CMA-ES that find where landings are; then clouds of policies around the best, each a smaller one."""
+    bounds = np.array(flights.experiment.policy.bounds)
+    seed = derive(flights.experiment.seed, Purpose.GRID)
+    rng = np.random.Generator(np.random.PCG64(seed))
+    n_stages = _SEARCHES + _CLOUDS + 1
+
+    def tell(stage: int) -> None:
+        if on_stage:
+            on_stage(stage, n_stages)
+
+    # what the experiment begins with may be good already, and of many parameters no search finds much in no time
+    begin = np.array(flights.experiment.policy.mu0)
+    found = [begin]
+    for search in range(_SEARCHES):
+        tell(search)
+        start = begin if search == 0 else rng.uniform(bounds[:, 0], bounds[:, 1])
+        found.append(_climb(flights, bounds, start, search))
+    elite = np.array(found)
+    for cloud in range(_CLOUDS):
+        tell(_SEARCHES + cloud)
+        spread = np.ptp(bounds, axis=1) * _CLOUD_SPREAD / 2**cloud
+        centre = np.resize(elite, (_CLOUD - len(elite), len(bounds)))
+        around = np.clip(centre + spread * rng.standard_normal(centre.shape), bounds[:, 0], bounds[:, 1])
+        elite, _, _ = _sift(flights, np.concatenate([elite, around]), _STAGES)
+    tell(n_stages - 1)
     # the best of a first look, judged by a second one
-    four, _ = _rates(world, experiment, np.array(found), n_final, stream, threads)
-    theta = found[int(np.argmax(four))][None]
-    stream += len(found) * n_final
-    four, spotless = _rates(world, experiment, theta, n_final, stream, threads)
-    words = f"best of {_SEARCHES} searches of {n_generations * _POPULATION} rollouts"
-    return Best(tuple(theta[0].tolist()), float(four[0]), float(spotless[0]), stream + n_final, words)
+    finalists, four, _ = _sift(flights, elite, ((1.0, _FINAL_ROLLOUTS),))
+    theta = finalists[int(np.argmax(four))]
+    four, spotless = flights.rates(theta[None], flights.scaled(_FINAL_ROLLOUTS))
+    each = flights.scaled(_GENERATIONS) * _POPULATION
+    words = f"{_SEARCHES} searches of {each} rollouts, the best refined in {_CLOUDS} clouds of {_CLOUD} policies"
+    return Best(tuple(theta.tolist()), float(four[0]), float(spotless[0]), flights.n_flown, words)
+
+
+def _climb(flights: _Flights, bounds: FloatArray, start: FloatArray, seed: int) -> FloatArray:
+    """Where one search ends, shape (dim,).
+
+    A landing counts 1, whatever its return: the rate is what is judged. The return leads to the first landings.
+    """
+    reward = flights.experiment.reward
+    learner = make_learner(
+        "cmaes", start, np.ptp(bounds, axis=1) / 5.0, bounds=bounds, n_rollouts=_POPULATION, seed=seed
+    )
+    for _ in range(flights.scaled(_GENERATIONS)):
+        if learner.stop():
+            break
+        theta = learner.ask()
+        outcomes = flights.outcomes(theta, 1)[:, 0]
+        total = reward.score(outcomes)[TOTAL]
+        lead = _LEAD * total / max(float(total.max()), np.finfo(np.float64).tiny)
+        learner.tell(theta, np.where(four_leg(outcomes), 1.0, lead))
+    return np.clip(learner.result.recommended, bounds[:, 0], bounds[:, 1])
 
 
 def judge(
@@ -211,35 +283,10 @@ def _axes(experiment: Experiment) -> list[GridAxis]:
     return found
 
 
-def _fly(
-    world: World, experiment: Experiment, theta: FloatArray, stream: npt.NDArray[np.integer[Any]], threads: int | None
-) -> Outcomes:
-    """Fly each policy with its streams of the search's random numbers, shape (m, n)."""
-    return world.rollouts(
-        experiment.speed_mps,
-        experiment.angle_deg,
-        *by_parameter(theta[:, None]),
-        form=experiment.policy.form,
-        seed=derive(experiment.seed, Purpose.GRID),
-        stream=stream,
-        start=experiment.start,
-        threads=threads,
-    )
-
-
 def _grid(axes: Sequence[GridAxis]) -> FloatArray:
     """Every combination of the axes' values, shape (m, dim)."""
     values = [axis.lo + axis.step * np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1) for axis in axes]
     return np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
-
-
-def _rates(
-    world: World, experiment: Experiment, theta: FloatArray, n_each: int, first_stream: int, threads: int | None
-) -> tuple[FloatArray, FloatArray]:
-    """Four-leg and clean rate of each policy, shape (m,) each, over `n_each` rollouts of the grid's random numbers."""
-    stream = first_stream + np.arange(len(theta) * n_each).reshape(len(theta), n_each)
-    outcomes = _fly(world, experiment, theta, stream, threads)
-    return four_leg(outcomes).mean(axis=1), clean(outcomes).mean(axis=1)
 
 
 def _check(

@@ -231,10 +231,16 @@ def check_policy(experiment: Experiment, label: str) -> None:
     """Check everything that names parameters of the policy against its form; `label` names the file in errors."""
     try:
         form = experiment.policy.shape
-        for p, (lo, hi) in zip(form.params, experiment.policy.bounds, strict=True):
+        for p, search in zip(form.params, experiment.policy.parameters, strict=True):
+            lo, hi = search.bounds
             if not p.lo <= lo < hi <= p.hi:
                 raise ConfigError(
-                    f"policy.{p.name}.bounds: [{lo:g}, {hi:g}] (allowed within {p.lo:g} .. {p.hi:g} {p.unit})"
+                    f"policy.{p.name}.bounds: [{lo:g}, {hi:g}] "
+                    f"(the form {form.name} allows within {p.lo:g} .. {p.hi:g} {p.unit})"
+                )
+            if not lo <= search.mu0 <= hi:
+                raise ConfigError(
+                    f"policy.{p.name}.mu0: value {search.mu0!r} is out of range (allowed {lo:g} .. {hi:g} {p.unit})"
                 )
         for flown in experiment.flown:
             flown.of(form, f"flown.{flown.label}")

@@ -93,7 +93,8 @@ class Form:
             if not good.all():
                 value = float(column[~good].flat[0])
                 raise ArgumentError(
-                    f"{p.name}: value {value!r} is out of range (allowed {p.lo:g} .. {p.hi:g} {p.unit})"
+                    f"form {self.name}: {p.name}: value {value!r} is out of range "
+                    f"(allowed {p.lo:g} .. {p.hi:g} {p.unit})"
                 )
         si: npt.NDArray[np.float64] = np.array([p.si for p in self.params])
         return values * si

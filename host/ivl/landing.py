@@ -9,7 +9,7 @@ same bits, today and in a report years later.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
@@ -52,6 +52,16 @@ class LandingSpec(Task):
         except ConfigError as error:
             raise ValueError(str(error)) from error
 
+    @model_validator(mode="after")
+    def _is_of_its_form(self) -> Self:
+        forms.by_name(self.form).to_si(self.theta)
+        return self
+
+    @property
+    def policy(self) -> dict[str, float]:
+        """The parameters of the policy by the names that the form gives them."""
+        return dict(zip(forms.by_name(self.form).names, self.theta, strict=True))
+
     def fly(self, world: World | None = None, period_s: float = TRACE_PERIOD_S) -> tuple[World, Trace]:
         """Fly it and record the time series; a world that exists already saves building one."""
         world = world or self.make_world()
@@ -70,11 +80,19 @@ class LandingSpec(Task):
 
 
 def _in_order(data: dict[str, Any]) -> dict[str, Any]:
-    """The data with `theta` in place of parameters under their names; what is wrong with them is left to be found."""
-    form = forms.forms().get(str(data.get("form", forms.PAPER)))
-    names = form.names if form else ()
-    if "theta" in data or not all(name in data for name in names):
+    """The data with `theta` in place of parameters under their names, of which all or none must be there."""
+    form = forms.by_name(str(data.get("form", forms.PAPER)))
+    names = form.names
+    given, missing = [name for name in names if name in data], [name for name in names if name not in data]
+    if not given:
         return data
+    if "theta" in data:
+        raise ValueError(f"theta: {given[0]} says it, too")
+    if missing:
+        raise ValueError(f"{missing[0]}: is missing (the form {form.name} has {', '.join(names)})")
+    for name in names:
+        if isinstance(data[name], bool) or not isinstance(data[name], (int, float)):
+            raise ValueError(f"{name}: value {data[name]!r} is not a number{yamlfile.number_hint(data[name])}")
     return {**{name: v for name, v in data.items() if name not in names}, "theta": [data[name] for name in names]}
 
 

@@ -12,8 +12,9 @@ enum
 };
 
 static const ivl_form_param_t PARAMS[] = {
-    EIGHT(0),      EIGHT(1),      EIGHT(2),      EIGHT(3),      EIGHT(4),      EIGHT(5), EIGHT(6), THRESHOLD(70), THRESHOLD(71),
-    THRESHOLD(72), THRESHOLD(73), THRESHOLD(74), THRESHOLD(75), THRESHOLD(76), {"flip_Nmm", "M", "N mm", 1.0e-3f, 0.0f, 0.02f, "moment"},
+    EIGHT(0),      EIGHT(1),      EIGHT(2),      EIGHT(3),      EIGHT(4),
+    EIGHT(5),      EIGHT(6),      THRESHOLD(70), THRESHOLD(71), THRESHOLD(72),
+    THRESHOLD(73), THRESHOLD(74), THRESHOLD(75), THRESHOLD(76), {"flip_Nmm", "M", "N mm", 1.0e-3f, 0.0f, 0.02f, "moment"},
 };
 _Static_assert(sizeof PARAMS / sizeof PARAMS[0] == IVL_FORM_PARAMS_MAX, "all of them");
 

@@ -4,8 +4,8 @@ import re
 from dataclasses import asdict
 from pathlib import Path
 
-from ivl import native
-from ivl.links import clock, preflight, vehicle
+from ivl import native, silproc
+from ivl.links import clock, pil, preflight, vehicle
 from ivl.links.deadlines import DEADLINES
 from ivl.links.landing_flight import HEIGHT_M_MIN
 
@@ -37,3 +37,16 @@ def test_numbers_of_the_preflight_are_those_of_the_code() -> None:
         f"has not answered one for {vehicle.UNHEARD_S_MAX} s of its time",
     ):
         assert text in PAGE, text
+
+
+def test_variables_of_the_environment_are_those_of_the_code() -> None:
+    told = re.findall(r"^\| `(IVL_\w+)` \| .* \| `([\w.-]+)`", PAGE, re.MULTILINE)
+    assert told == [
+        (native.LIBRARY_ENV, native.DEFAULT_LIBRARY.name),
+        (silproc.SERVER_ENV, silproc.DEFAULT_SERVER.name),
+        (pil.IMAGE_ENV, pil.IMAGE.name),
+        (pil.QEMU_ENV, pil.qemu_command(pil.IMAGE)[0]),
+    ]
+    package = Path(native.__file__).parent
+    used = {name for path in package.rglob("*.py") for name in re.findall(r'"(IVL_[A-Z_]+)"', path.read_text("utf-8"))}
+    assert used == {name for name, _ in told}

@@ -51,7 +51,7 @@ def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess, vert
     plan = Plan(theta, np.zeros(2, dtype=np.uint64), np.arange(2, dtype=np.uint64))
     with CrazyflieSource(server.uri, vertical) as source:
         refused, flown = source.fly(plan)
-    assert refused.discarded.startswith("vehicle: policy constant: rrev_c_per_s: value 25.0 is out of range")
+    assert refused.discarded.startswith("vehicle: policy: form constant: rrev_c_per_s: value 25.0 is out of range")
     assert np.isnan(refused.outcomes["t_impact_s"][0])
     assert flown.discarded == ""
     assert flown.outcomes["triggered"][0] == 1

@@ -108,13 +108,16 @@ def test_rollout_refuses_wrong_arguments_in_one_line(capsys: Capture, extra: lis
 
 def test_list_names_everything(capsys: Capture) -> None:
     data = json_of(["list"], capsys)
-    assert set(data) == {"vehicles", "gears", "sensors", "experiments", "learners", "rewards"}
+    assert set(data) == {"vehicles", "gears", "sensors", "experiments", "learners", "rewards", "forms"}
     assert {"ideal", "mocap", "camera50", "ranger10"} <= {entry["name"] for entry in data["sensors"]}
     assert {entry["name"] for entry in data["vehicles"]} == {"habas2021", "crazyflie21", "crazyflie21_brushless"}
     assert len(data["gears"]) == 12
     assert "experiments/paper_vertical.yaml" in {entry["name"] for entry in data["experiments"]}
     assert {"ephe", "ephe_robust", "cmaes", "bo"} <= {entry["name"] for entry in data["learners"]}
     assert {entry["name"] for entry in data["rewards"]} == {"paper", "authors_code"}
+    (form,) = data["forms"]
+    assert form["name"] == "constant"
+    assert form["parameters"]["moment_y_Nmm"]["unit"] == "N mm"
     assert all(entry["doc"] for entries in data.values() for entry in entries)
 
 

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import ivl
-from ivl import outcome
+from ivl import forms, outcome
 from ivl.learners import LEARNERS
 from ivl.rewards import REWARDS
 
@@ -22,6 +22,11 @@ def test_every_file_that_is_named_exists() -> None:
 def test_a_reward_is_one_file_and_one_row() -> None:
     helpers = {"__init__", "base", "parts"}
     assert {path.stem for path in (PACKAGE / "rewards").glob("*.py")} - helpers == set(REWARDS)
+
+
+def test_a_form_is_one_file_and_one_row() -> None:
+    files = {path.stem.removeprefix("ivl_form_") for path in (ROOT / "firmware" / "core").glob("ivl_form_*.c")}
+    assert files == set(forms.forms())
 
 
 def test_every_learner_is_in_the_registry() -> None:

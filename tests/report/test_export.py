@@ -118,7 +118,7 @@ def test_the_file_tells_what_was_flown_and_what_came_out(mcap: Path, spec: Landi
     with mcap.open("rb") as file:
         (record,) = make_reader(file).iter_metadata()
     assert record.name == "landing"
-    assert float(record.metadata["spec.rrev_c_per_s"]) == spec.rrev_c_per_s
+    assert float(record.metadata["spec.rrev_c_per_s"]) == spec.policy["rrev_c_per_s"]
     assert record.metadata["outcome.n_legs"] == "4"
 
 

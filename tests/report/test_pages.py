@@ -67,7 +67,7 @@ def test_every_rollout_of_a_learning_run_can_be_replayed(learn_run: Path, learn_
     assert len(stored) == len(rollouts["landing"]) == 24
     for number, (rrev, moment, reward, n_legs) in zip(rollouts["landing"], stored, strict=True):
         landing = learn_data["landings"][number]
-        assert (landing["spec"]["rrev_c_per_s"], landing["spec"]["moment_y_Nmm"]) == (rrev, moment)
+        assert landing["spec"]["theta"] == [rrev, moment]
         assert landing["outcome"]["n_legs"] == n_legs
         assert landing["outcome"]["reward"] == pytest.approx(reward, abs=0.01)
     assert decode(rollouts["theta"][0]) == pytest.approx([row[0] for row in stored], abs=6e-4)

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ivl import experiment, model
+from ivl import experiment, forms, model
 from ivl.cli import console
 from ivl.learners import LEARNERS
 from ivl.rewards import REWARDS, Reward
@@ -18,6 +18,8 @@ Examples:
       everything
   ivl list gears --json
       the landing gears, for a script
+  ivl list forms
+      the forms of a policy that this library has, and their parameters in the order of --theta
 """
 
 
@@ -30,6 +32,7 @@ class Kind(StrEnum):
     EXPERIMENTS = "experiments"
     LEARNERS = "learners"
     REWARDS = "rewards"
+    FORMS = "forms"
 
 
 def list_(
@@ -47,6 +50,9 @@ def list_(
         for entry in entries:
             label = f"{entry['gear_set']}/{entry['name']}" if "gear_set" in entry else entry["name"]
             console.out.print(f"  {label:40s} {entry['doc']}", highlight=False, soft_wrap=True)
+            for key, p in entry["parameters"].items() if kind is Kind.FORMS else ():
+                told = f"{p['lo']:g} .. {p['hi']:g} {p['unit']}"
+                console.out.print(f"    {key:38s} {told:22s} {p['doc']}", highlight=False, soft_wrap=True)
 
 
 def _entries(kind: Kind) -> list[dict[str, Any]]:
@@ -62,7 +68,14 @@ def _entries(kind: Kind) -> list[dict[str, Any]]:
         return [{"name": path, "doc": experiment.load(path).doc} for path in experiment.list_experiments()]
     if kind is Kind.LEARNERS:
         return [{"name": name, "doc": entry.doc, "options": _options(name)} for name, entry in LEARNERS.items()]
+    if kind is Kind.FORMS:
+        return [_form(form) for form in forms.forms().values()]
     return [_reward(reward) for reward in REWARDS.values()]
+
+
+def _form(form: forms.Form) -> dict[str, Any]:
+    parameters = {p.name: {"unit": p.unit, "lo": p.lo, "hi": p.hi, "doc": p.doc} for p in form.params}
+    return {"name": form.name, "doc": form.doc, "parameters": parameters}
 
 
 def _reward(reward: Reward) -> dict[str, Any]:

@@ -83,7 +83,8 @@ def of_spec(spec: LandingSpec, title: str, reward: RewardChoice | None = None) -
     """Fly a landing; `reward` is what its run paid for landings, if it comes from one."""
     world, trace = spec.fly()
     result = outcome.as_dict(trace.outcome, world.end_reason(trace.outcome.end_reason))
-    facts = {f"spec.{name}": str(value) for name, value in spec.model_dump(mode="json").items()}
+    said = {**spec.model_dump(mode="json", exclude={"theta"}), **spec.policy}
+    facts = {f"spec.{name}": str(value) for name, value in said.items()}
     facts |= {f"outcome.{name}": str(value) for name, value in result.items()}
     if reward:
         terms = reward.score(np.array([trace.outcome], dtype=trace.outcome.dtype))

@@ -80,7 +80,7 @@ def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str, RewardCho
     row = int(scored[np.argmax(rollouts.reward[scored])]) if choice.rollout is None else choice.rollout
     if row >= len(rollouts):
         raise ConfigError(f"--rollout {row}: trial {trial} of {folder} has rollouts 0 .. {len(rollouts) - 1}")
-    theta = (float(rollouts.theta[row, 0]), float(rollouts.theta[row, 1]))
+    theta = rollouts.theta[row].tolist()
     spec = landing.of_rollout(experiment, trial, theta, int(rollouts.stream[row]))
     return spec, f"{experiment.name}, trial {trial}, rollout {row}", experiment.reward
 

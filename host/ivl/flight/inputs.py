@@ -162,8 +162,8 @@ def _policy(flight: Flight) -> tuple[tuple[int, FloatArray], str]:
             form, theta = forms.by_name(flight.info["form"]), [float(text) for text in flight.info["theta"].split()]
         else:
             theta = [float(flight.info["threshold_per_s"]), np.nan_to_num(float(flight.info["moment_Nmm"]))]
-        if np.isnan(theta[0]):
-            theta, note = [form.params[0].hi, 0.0], "no policy in the log: the trigger is not compared"
+            if np.isnan(theta[0]):
+                theta, note = [form.params[0].hi, 0.0], "no policy in the log: the trigger is not compared"
         return (form.number, form.to_si(theta)), note
     except (ArgumentError, ValueError) as error:
         raise ConfigError(f"flight {flight.label}: policy: {error}") from error

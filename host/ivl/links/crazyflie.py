@@ -26,7 +26,7 @@ from ivl.links.sites import site_for
 from ivl.links.sites.base import Site, Visit, give_back_time
 from ivl.links.tables import Session
 from ivl.links.tracking import Tracking
-from ivl.links.vehicle import Command, PolicyRefused, Vehicle
+from ivl.links.vehicle import Command, OtherForms, PolicyRefused, Vehicle
 from ivl.outcome import Outcomes, valid
 from ivl.source import Flown, Plan
 
@@ -48,6 +48,7 @@ class CrazyflieSource:
             ConfigError: The URI is none, or the approach does not fit under the ceiling.
             LinkError: The vehicle cannot be reached.
             RolloutError: It must not fly as it is; the message says why and what to do.
+            OtherForms: It does not have the form of the experiment's policy.
         """
         check_uri(uri)
         self.uri, self._experiment, self.options = uri, experiment, options or Options()
@@ -130,7 +131,7 @@ class CrazyflieSource:
                 if self._site is not None:
                     self._site.after_refusal()
                 return Flown(index, _refused(), f"vehicle: {error}")
-            except FlyingEnds:
+            except (FlyingEnds, OtherForms):
                 raise
             except LinkError as error:
                 self._discard(rollout, attempt, error)
@@ -195,6 +196,8 @@ class CrazyflieSource:
             raise RolloutError(f"{self.uri}: not fit to fly: {'; '.join(filter(None, problems))}")
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         vehicle.configure(self.world)
+        if not again:  # on the ground: a vehicle with other forms is told from ours before it takes off
+            vehicle.put_policy(self._experiment.policy.shape, self._experiment.policy.mu0)
         if self._tracking is not None:
             self._tracking.watch_over(vehicle)
 

@@ -21,6 +21,7 @@ from ivl.experiment import Experiment
 from ivl.source import Flown, Plan, WorldSource
 from ivl.world import World
 
+IMAGE_ENV = "IVL_NATIVE_IMAGE"  # another build of the image, for example one with forms of one's own
 IMAGE = native.DEFAULT_LIBRARY.parent / "stm32f405.elf"
 QEMU_ENV = "IVL_QEMU"  # another emulator
 _ERROR_BYTES = 256
@@ -35,13 +36,13 @@ def qemu_command(image: Path) -> list[str]:
 
 
 def image_of(uri: str) -> Path:
-    """The image that a URI names, pil:// or pil:///path/of/image.elf.
+    """The image that a URI names: pil:// is the usual one, or that of IVL_NATIVE_IMAGE; pil:///path/of/image.elf.
 
     Raises:
         ConfigError: It is missing.
         RolloutError: The emulator is.
     """
-    image = Path(uri.removeprefix("pil://") or IMAGE)
+    image = Path(uri.removeprefix("pil://") or os.environ.get(IMAGE_ENV, IMAGE))
     if not image.is_file():
         raise ConfigError(f"{uri}: {image} is missing: run `make firmware`")
     emulator = qemu_command(image)[0]

@@ -43,6 +43,8 @@ _WALL_POLL_S = 0.005
 _LOGS_S = 3.0
 _ON_ITS_WAY = (Status.INCOMPLETE, Status.CRC)
 """What an echo says while the parts of a policy have not all come."""
+_WHOLE_MAX = 4
+"""So often a policy is sent as a whole; its checksum is wrong each time if the vehicle's form is another one."""
 
 
 class Supervisor(IntFlag):
@@ -56,6 +58,10 @@ class Supervisor(IntFlag):
     TUMBLED = 1 << 5
     LOCKED = 1 << 6
     CRASHED = 1 << 7
+
+
+class OtherForms(RolloutError):
+    """The vehicle does not have the form of a policy as this host has it; no policy of that form can be flown there."""
 
 
 class PolicyRefused(RolloutError):
@@ -102,17 +108,18 @@ class Offer:
         """
         self.seq, self.form = seq, form.number
         self.crc = form.crc(theta)
+        self.n_whole = 0  # times that all parts were sent
+        self.form_name = form.name
         self._parts = encode_policy(seq, form, theta)
-        self._text = f"policy {form.describe(theta)}"
-        self._sent = False
+        self._text = f"policy {form.name}: {form.describe(theta)}"
 
     def due(self, echo: Packet | None) -> list[bytes]:
         """Packets to send now: all at first, then those that the vehicle says are missing.
 
         While it says nothing, the last one alone is repeated: the vehicle answers to it.
         """
-        if not self._sent or (echo is not None and echo["status"] == Status.CRC):
-            self._sent = True
+        if not self.n_whole or (echo is not None and echo["status"] == Status.CRC):
+            self.n_whole += 1
             return self._parts
         if echo is None:
             return self._parts[-1:]
@@ -350,26 +357,33 @@ class Vehicle:
         try:
             self._offer = Offer(self._policy_seq, form, theta)
         except ArgumentError as error:
-            raise PolicyRefused(f"policy {form.name}: {error}") from error
+            raise PolicyRefused(f"policy: {error}") from error
 
     def confirm_policy(self) -> int:
         """The number of the policy on offer, once the vehicle has said that this one is in force.
 
         Raises:
             PolicyRefused: It is out of the vehicle's range.
+            OtherForms: The vehicle does not have its form, or has another one in its place.
             RolloutError: It was not confirmed.
         """
         offer = self._offer
         if offer is None:
             raise ValueError("no policy is on offer")
-        self.wait(lambda: self._policy_echo(offer) is not None, _ECHO_S, f"confirmation of {offer}", 2 * _CALL_S)
+        self.wait(
+            lambda: self._policy_echo(offer) is not None or offer.n_whole > _WHOLE_MAX,
+            _ECHO_S, f"confirmation of {offer}", 2 * _CALL_S,
+        )  # fmt: skip
         self._offer = None
         echo = self._policy_echo(offer)
-        status = Status(int(echo["status"])) if echo else Status.PHASE
+        status = Status(int(echo["status"])) if echo else Status.CRC
         if status == Status.RANGE:
             raise PolicyRefused(f"{offer}: the vehicle refused it: {STATUS_TEXT[status]}")
-        if status == Status.FORM:
-            raise LinkError(f"{offer}: the vehicle refused it: {STATUS_TEXT[status]}: flash the firmware of this host")
+        if status in (Status.FORM, Status.CRC):
+            raise OtherForms(
+                f"{self.session.uri}: the vehicle does not have the policy form {offer.form_name} of this host "
+                f"({STATUS_TEXT[status]}): flash the firmware of this host, or start its software vehicle"
+            )
         found = (echo["seq_in_force"], echo["crc_in_force"], echo["form_in_force"]) if echo else ()
         if status != Status.OK or found != (offer.seq, offer.crc, offer.form):
             raise RolloutError(f"{offer}: not in force: {STATUS_TEXT[status]}, the vehicle has {found}")

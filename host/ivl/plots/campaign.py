@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ivl import model
+from ivl import forms, model
 from ivl.analysis import region
 from ivl.analysis.intervals import Estimate
 from ivl.analysis.rates import RATE
@@ -93,12 +93,18 @@ def load(runs: Sequence[Path]) -> Campaign:
 
     Raises:
         StoreError: One holds no sweep.
-        ConfigError: One is a policy map, varies what no figure shows, or holds no finished trial.
+        ConfigError: One is a policy map, has another form of policies than the paper's, varies what no figure shows, or
+            holds no finished trial.
     """
     trials, episodes = [], []
     for run in runs:
-        if "sweep" not in store.read_manifest(run):
+        manifest = store.read_manifest(run)
+        if "sweep" not in manifest:
             raise ConfigError(f"{run}: is a policy map; figures are drawn of runs of `ivl sweep`")
+        if (form := manifest["sweep"]["policy"]["form"]) != forms.PAPER:
+            raise ConfigError(
+                f"{run}: has policies of the form {form}; figures are those of {forms.PAPER} (`ivl report` shows any)"
+            )
         trials.append(_plain(store.read_trials(run)))
         if varied := varied_columns(trials[-1]):
             paths = ", ".join(name.removeprefix(VARIED) for name in varied)

@@ -65,7 +65,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
 
 
 def _spec(experiment: Experiment, rollouts: RolloutRows, row: int) -> landing.LandingSpec:
-    theta = (float(rollouts.theta[row, 0]), float(rollouts.theta[row, 1]))
+    theta = rollouts.theta[row].tolist()
     return landing.of_rollout(experiment, int(rollouts.trial[row]), theta, int(rollouts.stream[row]))
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
+from ivl import forms
 from ivl.analysis.claims import evaluate
 from ivl.analysis.rates import CLEAN_RATE, RATE, cell_rates, rollouts_to_rate
 from ivl.errors import StoreError
@@ -41,7 +42,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
         "subtitle": sweep.doc,
         "facts": [*_facts(sweep, trials, cells), album.fact()],
         "manifest": flatten(manifest),
-        "claims": _claims(folder, trials, cells),
+        "claims": _claims(folder, trials, cells) if sweep.policy.form == forms.PAPER else None,
         "scale": replay.SCALE,
         "geometry": album.geometry,
         "landings": album.landings,
