@@ -59,20 +59,6 @@ float ivl_sim_motor_N(float norm, float thrust_N_max)
     return ivl_clamp(norm, 0.0f, 1.0f) * thrust_N_max;
 }
 
-/// The controller is called more often than the core, and carries the attitude on with the gyro that it has.  Nobody looks between two ticks
-/// of the core: these calls are made when the next one begins, unless it takes the estimator's attitude over, which leaves nothing of them.
-static void make_up(ivl_sim_autopilot_t *autopilot, const state_t *now, ivl_phase_t phase, float loop_s)
-{
-    if (app_sense_takes_over(&autopilot->senses, now, phase))
-    {
-        return;
-    }
-    for (int i = 0; i < autopilot->n_due; i++)
-    {
-        app_sense_attitude(&autopilot->senses, &autopilot->sensors, &autopilot->state, phase, loop_s);
-    }
-}
-
 void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, const ivl_in_t *sensed, ivl_sim_autopilot_t *autopilot,
                             ivl_state_t *firmware, ivl_out_t *out)
 {
@@ -82,10 +68,6 @@ void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, 
     sensorData_t sensors;
     state_t      state;
     ivl_sim_sdk_of(&autopilot->told, sensed, &sensors, &state);
-    make_up(autopilot, &state, firmware->phase, loop_s);
-    autopilot->sensors = sensors;
-    autopilot->state = state;
-    autopilot->n_due = n_loop - 1;
     in->cmd = sensed->cmd;
     in->rrev = sensed->rrev;
     in->flow = sensed->flow;
@@ -95,5 +77,10 @@ void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, 
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
         out->thrust_N[i] = ivl_sim_motor_N(out->thrust_N[i] / max_N, max_N);
+    }
+    // the controller is called more often than the core, and carries the attitude on with the gyro that it has
+    for (int i = 1; i < n_loop; i++)
+    {
+        app_sense_attitude(&autopilot->senses, &sensors, &state, firmware->phase, loop_s);
     }
 }

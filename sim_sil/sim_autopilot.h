@@ -22,9 +22,6 @@ typedef struct
 {
     ivl_sim_told_t told;
     app_senses_t   senses;
-    sensorData_t   sensors;  ///< since the last tick of the core,
-    state_t        state;    ///< what the SDK hands round,
-    int            n_due;    ///< and calls of the controller that have not been made up for
     ivl_in_t       in;  ///< as the core has seen it last
 } ivl_sim_autopilot_t;
 

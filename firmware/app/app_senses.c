@@ -28,11 +28,6 @@ void app_sense_attitude(app_senses_t *senses, const sensorData_t *sensors, const
     ivl_attitude_update(&senses->attitude, app_q_WB(state), follows_estimator(phase), app_w_B_radps(sensors), loop_s);
 }
 
-bool app_sense_takes_over(const app_senses_t *senses, const state_t *state, ivl_phase_t phase)
-{
-    return ivl_attitude_takes_over(&senses->attitude, app_q_WB(state), follows_estimator(phase));
-}
-
 void app_sense_motion(app_senses_t *senses, const sensorData_t *sensors, const state_t *state, ivl_phase_t phase, float loop_s,
                       uint64_t now_us, ivl_in_t *in)
 {

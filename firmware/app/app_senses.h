@@ -23,10 +23,6 @@ typedef struct
 /// else can have changed.
 void app_sense_attitude(app_senses_t *senses, const sensorData_t *sensors, const state_t *state, ivl_phase_t phase, float loop_s);
 
-/// True if a call takes the estimator's attitude over: then calls of app_sense_attitude that were left out since the last one make no
-/// difference.
-bool app_sense_takes_over(const app_senses_t *senses, const state_t *state, ivl_phase_t phase);
-
 /// Motion: converts into the core's units, carries the attitude on with the gyro, and dates the position by its last change.
 /// @param[in] phase   of the core, before this call: attitude follows the estimator where an estimator for upright flight can be right
 /// @param[in] loop_s  time between two calls

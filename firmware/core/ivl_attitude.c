@@ -18,15 +18,10 @@ static ivl_quat_t turned(ivl_quat_t q, ivl_vec3_t half)
     return (ivl_quat_t){t.x * scale, t.y * scale, t.z * scale, t.w * scale};
 }
 
-bool ivl_attitude_takes_over(const ivl_attitude_t *attitude, ivl_quat_t q_estimate_WB, bool is_followed)
-{
-    // bytes, not numbers: an estimate that is no number also counts as new
-    return is_followed && (memcmp(&attitude->q_seen, &q_estimate_WB, sizeof q_estimate_WB) != 0);
-}
-
 void ivl_attitude_update(ivl_attitude_t *attitude, ivl_quat_t q_estimate_WB, bool is_followed, ivl_vec3_t w_B_radps, float dt_s)
 {
-    const bool takes_over = ivl_attitude_takes_over(attitude, q_estimate_WB, is_followed);
+    // bytes, not numbers: an estimate that is no number also counts as seen
+    const bool is_new = memcmp(&attitude->q_seen, &q_estimate_WB, sizeof q_estimate_WB) != 0;
     attitude->q_seen = q_estimate_WB;
-    attitude->q_WB = takes_over ? q_estimate_WB : turned(attitude->q_WB, ivl_scale(w_B_radps, 0.5f * dt_s));
+    attitude->q_WB = (is_followed && is_new) ? q_estimate_WB : turned(attitude->q_WB, ivl_scale(w_B_radps, 0.5f * dt_s));
 }

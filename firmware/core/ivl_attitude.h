@@ -10,9 +10,6 @@ typedef struct
     ivl_quat_t q_seen;  ///< last output of the estimator
 } ivl_attitude_t;
 
-/// True if an update takes the estimator's output over: what the attitude was before then makes no difference.
-bool ivl_attitude_takes_over(const ivl_attitude_t *attitude, ivl_quat_t q_estimate_WB, bool is_followed);
-
 /// One gyro sample.  An output of the estimator that differs from the last one is taken over, if the estimator is to be followed;
 /// else the last attitude turns by w dt.
 /// @param[in] q_estimate_WB  present output of the estimator, unit length; a bad one is passed on, for ivl_step to refuse
