@@ -161,7 +161,7 @@ void world_handle_touches(ivl_sim_group_t *group, int lane, const double gap[IVL
     {
         return;
     }
-    bool             event = false, foot_event = false;
+    bool event = false, foot_event = false;
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
         const bool is_foot = i < IVL_SIM_LEGS;

@@ -10,8 +10,8 @@
 #include "phys_mass.h"
 #include "phys_rotor.h"
 #include "phys_state.h"
-#include "world_sensors.h"
 #include "sim_autopilot.h"
+#include "world_sensors.h"
 
 enum
 {
