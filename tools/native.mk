@@ -79,6 +79,7 @@ SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.
 CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
+EXPORTS := sim_sil/exports.map
 LIBRARY := host/ivl/_native/libivl_sil.so
 SERVER  := host/ivl/_native/ivl_sil
 CRTP    := $(patsubst %.c,$(BUILD)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
@@ -106,9 +107,9 @@ $(LIBRARY): $(BUILD)/libivl_sil.so
 	@mkdir -p $(@D)
 	@cp $< $@.new && mv -f $@.new $@
 
-$(BUILD)/libivl_sil.so: $(CORE) $(SIM) $(BUILD)/objects.txt
+$(BUILD)/libivl_sil.so: $(CORE) $(SIM) $(BUILD)/objects.txt $(EXPORTS)
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -shared -Wl,-Bsymbolic -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -shared -Wl,-Bsymbolic -Wl,--version-script=$(EXPORTS) -o $@ $(filter %.o,$^) $(LDLIBS)
 
 $(SERVER): $(BUILD)/ivl_sil
 	@mkdir -p $(@D)

@@ -34,7 +34,7 @@ static double foot_gap(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int l
            w->model->raw.leg_foot_radius_m;
 }
 
-void world_gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double t_s, double gap[IVL_SIM_GAPS])
+bool world_gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double t_s, double gap[IVL_SIM_GAPS])
 {
     const ivl_sim_surface_t *surface = &w->model->surface;
     const double             surface_m = ivl_sim_world_surface_m(w, t_s);
@@ -51,6 +51,7 @@ void world_gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, do
         const bool may_touch = near && !w->plate_touched[i];
         gap[IVL_SIM_LEGS + i] = may_touch ? room - ivl_sim_plate_top(&w->model->plate[i], normal) : FAR_M;
     }
+    return near;
 }
 
 static double hermite(double g0, double d0, double g1, double d1, double x)
@@ -95,7 +96,10 @@ double world_event_share(ivl_sim_group_t *group, int lane)
     double                   share = WORLD_NO_EVENT;
     double                  *g1 = w->trial.gap_after_m;
     const ivl_sim_surface_t *surface = &w->model->surface;
-    world_gaps(w, &group->next, lane, w->t_s + dt, g1);
+    if (!world_gaps(w, &group->next, lane, w->t_s + dt, g1))
+    {
+        return WORLD_NO_EVENT;
+    }
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
         double s = WORLD_NO_EVENT;
@@ -139,10 +143,25 @@ static void stop_held_feet(ivl_sim_group_t *group, int lane)
     ivl_sim_lane_set(&group->state, lane, &kin);
 }
 
+/// Positive form: a gap that is no number has been passed.
+static bool all_open(const double gap[IVL_SIM_GAPS])
+{
+    bool open = true;
+    for (int i = 0; i < IVL_SIM_GAPS; i++)
+    {
+        open = open & (gap[i] > ((i < IVL_SIM_LEGS) ? FOOT_TOLERANCE_M : PLATE_TOLERANCE_M));
+    }
+    return open;
+}
+
 void world_handle_touches(ivl_sim_group_t *group, int lane, const double gap[IVL_SIM_GAPS])
 {
     ivl_sim_world_t *w = &group->world[lane];
-    bool             event = false, foot_event = false;
+    if (all_open(gap))
+    {
+        return;
+    }
+    bool event = false, foot_event = false;
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
         const bool is_foot = i < IVL_SIM_LEGS;
@@ -176,11 +195,26 @@ void world_handle_touches(ivl_sim_group_t *group, int lane, const double gap[IVL
     }
 }
 
+/// Feet of which none is held, or has just come off.
+static bool all_loose(const ivl_sim_world_t *w)
+{
+    bool loose = true;
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        loose = loose & (w->foot[i] == IVL_SIM_FOOT_FREE) & !w->detached[i];
+    }
+    return loose;
+}
+
 bool world_handle_held(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t        *w = &group->world[lane];
     const ivl_sim_params_t *raw = &w->model->raw;
     bool                    event = false;
+    if (all_loose(w))
+    {
+        return false;
+    }
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const double pull = group->rate.pull_N[i][lane];

@@ -9,7 +9,8 @@
 #define WORLD_NO_EVENT 2.0
 
 /// Distances that make an event when they pass zero: of feet that may stick, and of plates that have not touched yet.
-void world_gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double t_s, double gap[IVL_SIM_GAPS]);
+/// @return false if the surface is far from all of them
+bool world_gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double t_s, double gap[IVL_SIM_GAPS]);
 
 /// Share of the tried step after which the earliest event happens.
 double world_event_share(ivl_sim_group_t *group, int lane);

@@ -10,8 +10,8 @@
 #include "phys_mass.h"
 #include "phys_rotor.h"
 #include "phys_state.h"
-#include "world_sensors.h"
 #include "sim_autopilot.h"
+#include "world_sensors.h"
 
 enum
 {
@@ -43,7 +43,7 @@ typedef struct
     const ivl_sim_model_t *model;
     ivl_sim_rng_t          rng;
     double                 t_s;
-    double                 surface_m;                      ///< height of the surface at time 0
+    double                 surface_m, surface_mps;         ///< height of the surface at time 0, and how fast it rises
     double                 left_s;                         ///< of the present tick
     uint32_t               n_tick;                         ///< ticks of the flight core since the start
     uint32_t               n_step;                         ///< integration steps since the start

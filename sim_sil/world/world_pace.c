@@ -5,13 +5,23 @@
 
 static const double STILL_RADPS = 20.0;  // a body that turns slower than this is not looked at closely
 
+static bool all_stuck(const ivl_sim_world_t *w)
+{
+    bool all = true;
+    for (int i = 0; i < IVL_SIM_LEGS && all; i++)
+    {
+        all = w->foot[i] == IVL_SIM_FOOT_STUCK;
+    }
+    return all;
+}
+
 /// Four stuck feet hold the body redundantly, and near the posture in which the lines of the legs meet in one point it can
 /// turn a little all the same: there a step must not turn it far, or the truss pumps energy.
 static double longest_step(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
     const double            most = ivl_sim_smaller(w->impact.happened ? raw->step_swing_s : raw->step_flight_s, w->model->step.longest_s);
-    if (ivl_sim_world_count_stuck(w) < IVL_SIM_LEGS)
+    if (!all_stuck(w))
     {
         return most;
     }
@@ -79,7 +89,7 @@ double world_next_step(const ivl_sim_group_t *group, int lane)
 /// of it is one to try again from.
 static bool mispredicted(const ivl_sim_group_t *group, int lane)
 {
-    if (ivl_sim_world_count_stuck(&group->world[lane]) < IVL_SIM_LEGS)
+    if (!all_stuck(&group->world[lane]))
     {
         return false;
     }

@@ -74,7 +74,7 @@ void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *
 
 double ivl_sim_world_surface_m(const ivl_sim_world_t *w, double t_s)
 {
-    return w->surface_m + t_s * ivl_sim_surface_speed(&w->model->surface);
+    return w->surface_m + t_s * w->surface_mps;
 }
 
 double ivl_sim_world_gap_m(const ivl_sim_group_t *group, int lane)
@@ -140,6 +140,7 @@ void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rn
     w->model = model;
     w->rng = *rng;
     w->surface_m = ivl_sim_surface_height(&model->surface, 0.0);
+    w->surface_mps = ivl_sim_surface_speed(&model->surface);
     w->graded_s = model->raw.step_flight_s * model->raw.step_scale_norm;
     w->step_s = w->graded_s;
     ivl_sim_contact_set(model, &group->contact, lane, w->foot);

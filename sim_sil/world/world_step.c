@@ -48,8 +48,9 @@ static void begin_step(ivl_sim_group_t *group, int lane)
 }
 
 /// Looks at the step that was tried.
+/// @param[in] diverged  where it led to is no motion any more
 /// @return true if it stands; if not, another has been proposed
-static bool judge(ivl_sim_group_t *group, int lane)
+static bool judge(ivl_sim_group_t *group, int lane, bool diverged)
 {
     ivl_sim_world_t *w = &group->world[lane];
     if (world_handle_held(group, lane))
@@ -63,7 +64,7 @@ static bool judge(ivl_sim_group_t *group, int lane)
     }
     const double most = world_longest_retry(group, lane);
     // where a motion that is none meets the surface says nothing, and to step there would take for ever
-    const bool   locate = w->trial.n_try < IVL_SIM_LOCATE_MAX && !ivl_sim_world_diverged(&group->next, lane);
+    const bool   locate = w->trial.n_try < IVL_SIM_LOCATE_MAX && !diverged;
     const double share = locate ? world_event_share(group, lane) : WORLD_NO_EVENT;
     const double dt = (share < 1.0) ? share * w->trial.dt_s : w->trial.dt_s;
     if (dt < w->trial.dt_s || most < w->trial.dt_s - IVL_SIM_TIME_SLACK_S)
@@ -82,7 +83,7 @@ bool ivl_sim_world_diverged(const ivl_sim_state_t *s, int lane)
     return !(rate_radps < 1.0e6 && far_m < 1.0e6);
 }
 
-static void accept(ivl_sim_group_t *group, int lane)
+static void accept(ivl_sim_group_t *group, int lane, bool diverged)
 {
     ivl_sim_world_t *w = &group->world[lane];
     if (w->trial.starting)
@@ -97,7 +98,7 @@ static void accept(ivl_sim_group_t *group, int lane)
     w->t_s += w->trial.dt_s;
     w->left_s -= w->trial.dt_s;
     w->n_step++;
-    if (ivl_sim_world_diverged(&group->next, lane))
+    if (diverged)
     {
         w->left_s = 0.0;  // the tick ends here, and with it the landing
     }
@@ -176,10 +177,11 @@ void ivl_sim_group_step(ivl_sim_group_t *group)
     ivl_sim_leapfrog(group->model, &group->contact, &group->load, &group->dt_s, &group->state, &group->last, &group->next, &group->rate);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        stands[lane] = moving[lane] && judge(group, lane);
+        const bool diverged = moving[lane] && ivl_sim_world_diverged(&group->next, lane);
+        stands[lane] = moving[lane] && judge(group, lane, diverged);
         if (stands[lane])
         {
-            accept(group, lane);
+            accept(group, lane, diverged);
             group->world[lane].trial.n_try = 0;
         }
     }

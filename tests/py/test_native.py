@@ -24,6 +24,13 @@ def test_load_refuses_another_interface_version(monkeypatch: pytest.MonkeyPatch)
         native.NativeLibrary(native.library().path)
 
 
+@pytest.mark.parametrize("inner", ["ivl_sim_fly", "ivl_sim_group_step", "ivl_step"])
+def test_the_library_shows_its_interface_alone(inner: str) -> None:
+    # what is called from one place in all is inlined there only if nobody outside can call it
+    assert hasattr(native.library().c, "ivl_sil_rollouts")
+    assert not hasattr(native.library().c, inner)
+
+
 def test_library_can_be_chosen_by_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     copy = tmp_path / "copy.so"
     copy.write_bytes(native.library().path.read_bytes())
