@@ -18,14 +18,14 @@
 /// The output of one tick.  Thrusts are finite and within [0, motor_thrust_N_max], always.
 typedef struct
 {
-    float         thrust_N[4];    ///< M1 front-right, M2 rear-right, M3 rear-left, M4 front-left
-    uint16_t      pwm[4];         ///< the same through the thrust curve
-    ivl_phase_t   phase;          ///< after this tick's transitions
-    uint8_t       phase_log;      ///< the same in one byte, for logs
-    bool          motors_on;      ///< the phase drives the motors in this tick
-    bool          stock_allowed;  ///< IDLE and not locked out: another controller may have the motors
-    ivl_ceiling_t ceiling;        ///< invalid in phases that are latched off
-    ivl_cues_t    cues;           ///< invalid in phases that are latched off
+    float         thrust_N[4];      ///< M1 front-right, M2 rear-right, M3 rear-left, M4 front-left
+    uint16_t      pwm[4];           ///< the same through the thrust curve
+    ivl_phase_t   phase;            ///< after this tick's transitions
+    uint8_t       phase_log;        ///< the same in one byte, for logs
+    bool          motors_on;        ///< the phase drives the motors in this tick
+    bool          stock_allowed;    ///< IDLE and not locked out: another controller may have the motors
+    ivl_ceiling_t ceiling;          ///< invalid in phases that are latched off
+    ivl_cues_t    cues;             ///< invalid in phases that are latched off
     float         pitch_moment_Nm;  ///< moment about b_y that thrust_N makes; negative is nose up
     float         thrust_total_N;
 } ivl_out_t;

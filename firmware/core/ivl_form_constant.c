@@ -10,7 +10,8 @@ enum
 };
 
 static const ivl_form_param_t PARAMS[] = {
-    [RREV_C] = {"rrev_c_per_s", "RREV_c", "1/s", 1.0f, 0.0f, 20.0f, "RREV at which the flip starts; 0: the first tick that sees the ceiling close"},
+    [RREV_C] = {"rrev_c_per_s", "RREV_c", "1/s", 1.0f, 0.0f, 20.0f,
+                "RREV at which the flip starts; 0: the first tick that sees the ceiling close"},
     [MOMENT] = {"moment_y_Nmm", "M_yd", "N mm", 1.0e-3f, 0.0f, 0.02f, "nose-up moment of the front motors"},
 };
 _Static_assert(sizeof PARAMS / sizeof PARAMS[0] == N_PARAMS, "one row a parameter");

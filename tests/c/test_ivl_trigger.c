@@ -45,15 +45,15 @@ static void test_trigger_of_a_policy_that_flips_at_once_needs_a_closing_ceiling_
 static void test_latch_copies_everything_of_the_tick(void)
 {
     // Given a tick with distinct values everywhere
-    const ivl_sample_t  sample = {.t_us = 11,
-                                  .t_pose_us = 9,
-                                  .p_WB_m = {1.0f, 2.0f, 3.0f},
-                                  .v_WB_mps = {4.0f, 5.0f, 6.0f},
-                                  .q_WB = {0.1f, 0.2f, 0.3f, 0.9f},
-                                  .w_B_radps = {7.0f, 8.0f, 9.0f},
-                                  .f_B_mps2 = {10.0f, 11.0f, 12.0f}};
-    const ivl_ceiling_t ceiling = {.d_ceil_m = 0.5f, .v_close_mps = 6.0f, .age_s = 0.001f, .valid = true};
-    const ivl_cues_t    cues = {.rrev_per_s = 12.0f, .of_y_radps = -8.0f, .valid = true};
+    const ivl_sample_t    sample = {.t_us = 11,
+                                    .t_pose_us = 9,
+                                    .p_WB_m = {1.0f, 2.0f, 3.0f},
+                                    .v_WB_mps = {4.0f, 5.0f, 6.0f},
+                                    .q_WB = {0.1f, 0.2f, 0.3f, 0.9f},
+                                    .w_B_radps = {7.0f, 8.0f, 9.0f},
+                                    .f_B_mps2 = {10.0f, 11.0f, 12.0f}};
+    const ivl_ceiling_t   ceiling = {.d_ceil_m = 0.5f, .v_close_mps = 6.0f, .age_s = 0.001f, .valid = true};
+    const ivl_cues_t      cues = {.rrev_per_s = 12.0f, .of_y_radps = -8.0f, .valid = true};
     const ivl_policy_id_t policy = {.seq = 42, .crc = 77, .form = 3};
     const ivl_action_t    action = {.flip = true, .go = true, .moment_Nm = 0.007f};
 

@@ -58,7 +58,8 @@ static void test_packets_survive_the_way_and_refuse_what_is_not_theirs(void)
     CHECK_ROUND_TRIP(policy, .seq = 7, .crc = 0x12345678u, .form = 1, .n = 6, .part = 1, .theta0 = 4.8f, .theta3 = 0.008f);
     CHECK_ROUND_TRIP(command, .seq = 9, .request = 1, .hover_x_m = -1.5f, .hover_y_m = 2.0f, .hover_z_m = 1.0f, .speed_mps = 2.5f);
     CHECK_ROUND_TRIP(reading, .valid = 1, .age_s = 0.02f, .rrev_per_s = 4.8f, .of_y_radps = -1.5f);
-    CHECK_ROUND_TRIP(policy_echo, .seq = 7, .status = -2, .missing = 0x8001u, .seq_in_force = 6, .crc_in_force = 0xdeadbeefu, .form_in_force = 2);
+    CHECK_ROUND_TRIP(policy_echo, .seq = 7, .status = -2, .missing = 0x8001u, .seq_in_force = 6, .crc_in_force = 0xdeadbeefu,
+                     .form_in_force = 2);
     CHECK_ROUND_TRIP(command_echo, .seq = 65535, .status = -1, .request = 3, .phase = 7, .rule = 11, .cause = 12);
     CHECK_ROUND_TRIP(config_echo, .seq = 1, .status = -3, .bad = 255, .crc = 0xdeadbeefu);
 }

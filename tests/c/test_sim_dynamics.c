@@ -144,7 +144,7 @@ typedef struct
 
 static void constrain(reference_t *r, ivl_d3_t along, spot_t plus, spot_t minus, double compliance)
 {
-    const int     row = N_Q + r->n_c;
+    const int    row = N_Q + r->n_c;
     const spot_t points[2] = {plus, minus};
     for (int k = 0; k < 2; k++)
     {
@@ -234,7 +234,7 @@ static void add_leg(reference_t *r, const ivl_sim_model_t *model, const ivl_sim_
 
     const spot_t at_hip = {rod, turn, ivl_d3_scale(-0.5 * length, n)}, of_body = {0, 3, hip};
     const spot_t at_foot = {rod, turn, ivl_d3_scale(0.5 * length, n)}, of_ball = {ball, -1, {0.0, 0.0, 0.0}},
-                  ceiling = {-1, -1, {0.0, 0.0, 0.0}};
+                 ceiling = {-1, -1, {0.0, 0.0, 0.0}};
     // the hip: along the rod, with the slip, and across it
     ivl_d3_t across = ivl_d3_cross(n, axis_vector(fabs(n.x) < 0.6 ? 0 : 1));
     across = ivl_d3_scale(1.0 / sqrt(ivl_d3_dot(across, across)), across);

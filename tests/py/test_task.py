@@ -191,4 +191,7 @@ def test_the_files_that_the_design_sends_people_to_are_there() -> None:
     assert len(named) >= 8
     assert [path for path in named if not (root / path).exists()] == []
     for name, path in re.findall(r"`([A-Z_0-9]+)` (?:of|in) `([\w/.]+)`", rows):
-        assert f"\n{name}" in (root / path).read_text(encoding="utf-8"), (name, path)
+        assert re.search(rf"^(?:#define )?{name}\b", (root / path).read_text(encoding="utf-8"), re.MULTILINE), (
+            name,
+            path,
+        )
