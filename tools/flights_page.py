@@ -233,6 +233,6 @@ def _repeat(d: dict[str, Any]) -> str:
     ivl learn experiments/paper_flight.yaml --set vehicle=my.yaml
 
 Forms of logs: [FLIGHT_DATA.md](FLIGHT_DATA.md). How often the intervals of `identify` hold on vehicles whose numbers are known:
-`tools/identify_study.py` (12 repetitions of 8 landings: 35 of 36 held; the vehicle there has the model that is fitted, so errors of the
+`tools/identify_study.py` (50 repetitions of 8 landings: 149 of 150 held; the vehicle there has the model that is fitted, so errors of the
 model are not in it). The figures here are of {names}. Windows and rates are of
 64 and 1000 simulated landings a point, so a window's ends are known to 0.05 1/s."""
