@@ -49,7 +49,7 @@ static void test_parts_in_any_order_and_twice_make_the_policy(void)
             {
                 TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_INCOMPLETE, take(&policy, order[i]));
                 TEST_ASSERT_EQUAL_INT(IVL_WIRE_ERR_INCOMPLETE, take(&policy, order[rng_below(&rng, i + 1u)]));
-                TEST_ASSERT_TRUE((parts.missing >> order[n - 1u]) & 1u);
+                TEST_ASSERT_TRUE(((uint32_t)parts.missing >> order[n - 1u]) & 1u);
             }
             TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, take(&policy, order[n - 1u]));
             TEST_ASSERT_EQUAL_MEMORY(&policy, &parts.policy, sizeof policy);
