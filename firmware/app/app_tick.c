@@ -45,7 +45,8 @@ void app_start_core(app_t *app)
     app->in.cmd.request = IVL_REQUEST_IDLE;
     app->out = (ivl_out_t){.stock_allowed = !was_active};
     app->owner = was_active ? APP_OWNER_CORE : APP_OWNER_STOCK;
-    app->senses = (app_senses_t){.has_pose = false};
+    // what was sensed last stays: an estimator or a sensor that stood still meanwhile is as old as it was
+    app->senses.attitude = (ivl_attitude_t){.q_WB = {0.0f, 0.0f, 0.0f, 1.0f}};
 }
 
 // ---- each call

@@ -17,8 +17,8 @@ typedef struct
 uint32_t ivl_parts_count(uint32_t n);
 
 /// Take a part.  One with another number, checksum, form or length begins a new policy and forgets the old one.
-/// @return IVL_OK when parts->policy is whole and its checksum right; IVL_WIRE_ERR_INCOMPLETE; IVL_WIRE_ERR_CRC, and all parts are forgotten;
-///         IVL_ERR_FORM for a form or length that this vehicle does not have; IVL_ERR_RANGE for a part that such a policy does not have
+/// @return IVL_WIRE_OK when parts->policy is whole and its checksum right; IVL_WIRE_ERR_INCOMPLETE; IVL_WIRE_ERR_CRC, and all parts are forgotten;
+///         IVL_WIRE_ERR_FORM for a form or length that this vehicle does not have; IVL_WIRE_ERR_RANGE for a part that such a policy does not have
 ivl_wire_status_t ivl_parts_take(ivl_parts_t *parts, const ivl_wire_policy_t *part);
 
 /// True for the last part in order: its sender waits for an answer.

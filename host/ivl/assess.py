@@ -25,7 +25,7 @@ import numpy.typing as npt
 from ivl.experiment import GRID_DIMENSIONS_MAX, Experiment, GridAxis
 from ivl.learners import make_learner
 from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
-from ivl.outcome import Outcomes, clean, four_leg, solved, stuck
+from ivl.outcome import Outcomes, clean, four_leg, solved, stuck, valid
 from ivl.rewards import TOTAL
 from ivl.seeds import Purpose, derive
 from ivl.source import by_parameter
@@ -200,7 +200,9 @@ def _search_long(flights: _Flights, on_stage: OnStage | None) -> Best:
     theta = finalists[int(np.argmax(four))]
     four, spotless = flights.rates(theta[None], flights.scaled(_FINAL_ROLLOUTS))
     each = flights.scaled(_GENERATIONS) * _POPULATION
-    words = f"{_SEARCHES} searches of {each} rollouts, the best refined in {_CLOUDS} clouds of {_CLOUD} policies"
+    words = (
+        f"{_SEARCHES} searches of {each} rollouts at most, the best refined in {_CLOUDS} clouds of {_CLOUD} policies"
+    )
     return Best(tuple(theta.tolist()), float(four[0]), float(spotless[0]), flights.n_flown, words)
 
 
@@ -218,9 +220,11 @@ def _climb(flights: _Flights, bounds: FloatArray, start: FloatArray, seed: int) 
             break
         theta = learner.ask()
         outcomes = flights.outcomes(theta, 1)[:, 0]
-        total = reward.score(outcomes)[TOTAL]
+        # what the vehicle refuses has no return, and is as bad as any failure
+        ok = valid(outcomes)
+        total = np.where(ok, reward.score(outcomes)[TOTAL], 0.0)
         lead = _LEAD * total / max(float(total.max()), np.finfo(np.float64).tiny)
-        learner.tell(theta, np.where(four_leg(outcomes), 1.0, lead))
+        learner.tell(theta, np.where(ok & four_leg(outcomes), 1.0, lead))
     return np.clip(learner.result.recommended, bounds[:, 0], bounds[:, 1])
 
 

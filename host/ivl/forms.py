@@ -6,6 +6,8 @@ print(form.names, [p.unit for p in form.params])
 A theta is given in the units that people use (N mm, say); `Form.to_si` turns it into the numbers that travel.
 """
 
+import re
+import sqlite3
 from dataclasses import dataclass
 from functools import cache
 
@@ -13,10 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl import native
-from ivl.errors import ArgumentError
+from ivl.errors import ArgumentError, NativeError
 
 PAPER = "constant"
 """The paper's form, and the default everywhere."""
+_COLUMNS = frozenset(
+    ("trial", "episode", "idx", "number", "status", "reward", "gear", "vehicle", "gear_set", "learner", "form")
+)
+"""Names of columns and arguments that stand beside those of the parameters."""
 _SI_DIGITS = 9  # of a float in single precision
 
 
@@ -116,7 +122,29 @@ def forms() -> dict[str, Form]:
         Form(number, name, doc, tuple(_parameter(*row) for row in rows))
         for number, (name, doc, rows) in enumerate(native.library().forms())
     ]
+    for form in found:
+        _check_names(form)
     return {form.name: form for form in found}
+
+
+def _check_names(form: Form) -> None:
+    """Names of parameters become columns, keys and arguments: refuse those that something else has, or no column can.
+
+    Raises:
+        NativeError: A name is no name, or is taken.
+    """
+    taken = {name.lower() for name in native.library().spec_fields} | _COLUMNS
+    for name in form.names:
+        why = "" if re.fullmatch(r"[A-Za-z]\w*", name) else "it is no word of letters, digits and _"
+        why = why or ("it is taken" if name.lower() in taken else "")
+        if not why:
+            try:
+                sqlite3.connect(":memory:").execute(f"CREATE TABLE t({name} REAL)")
+            except sqlite3.Error:
+                why = "it is a word of SQL"
+        if why:
+            raise NativeError(f"policy form {form.name}: parameter {name!r}: {why}")
+        taken.add(name.lower())
 
 
 def by_name(name: str) -> Form:
@@ -132,7 +160,15 @@ def by_name(name: str) -> Form:
 
 def _parameter(symbol: str, field: native.Field) -> Parameter:
     si = _decimal(field.default if field.default is not None else 1.0)
-    return Parameter(field.name, symbol, field.unit, si, _decimal(field.lo) / si, _decimal(field.hi) / si, field.doc)
+    return Parameter(
+        field.name,
+        symbol,
+        field.unit,
+        si,
+        _decimal(_decimal(field.lo) / si),
+        _decimal(_decimal(field.hi) / si),
+        field.doc,
+    )
 
 
 def _decimal(value: float) -> float:

@@ -53,6 +53,18 @@ class Setup(Strict):
     )
     overrides: dict[str, Setting] = Field(default_factory=dict, description="Parameters of the world that differ.")
 
+    @model_validator(mode="after")
+    def _one_word_for_each(self) -> Self:
+        """Refuse an override of what approach or estimator say otherwise: one of them would do nothing."""
+        said = {} if self.approach == APPROACHES[0] else approach_settings(self.approach)
+        for name, value in {**said, **estimator_settings(self.estimator)}.items():
+            override = self.overrides.get(name)
+            if override is not None and override.value != value:
+                field = "estimator" if name in estimator_settings(self.estimator) else "approach"
+                said_by = f"{field} {getattr(self, field)!r}"
+                raise ValueError(f"overrides.{name}: {override.value:g} contradicts {said_by}, which says {value:g}")
+        return self
+
     def world_settings(self) -> dict[str, float]:
         """World parameters that differ from what vehicle, gear and sensor set say."""
         overrides = {name: setting.value for name, setting in self.overrides.items()}

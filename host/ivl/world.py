@@ -8,8 +8,9 @@ A rollout is a pure function of the world, its arguments, `seed` and `stream`: t
 on one thread or many.
 """
 
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -226,10 +227,11 @@ class World:
             speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
         n_threads = _check_threads(threads)
-        outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
-        for first in range(0, specs.size, _BATCH_ROLLOUTS):
-            part = slice(first, first + _BATCH_ROLLOUTS)
-            outcomes[part] = self._native.rollouts(specs[part], n_threads)
+        n = math.prod(shape)
+        outcomes = np.zeros(n, dtype=self._library.outcome_dtype)
+        for first in range(0, n, _BATCH_ROLLOUTS):
+            part = slice(first, min(first + _BATCH_ROLLOUTS, n))
+            outcomes[part] = self._native.rollouts(specs(part), n_threads)
         return outcomes.reshape(shape).view(np.recarray)
 
     def trace(
@@ -255,7 +257,7 @@ class World:
             raise ArgumentError(f"trace: the arguments must be scalars, they broadcast to {shape}")
         if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
             raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
-        rows, outcome = self._native.trace(specs, period_s)
+        rows, outcome = self._native.trace(specs(slice(0, 1)), period_s)
         return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
 
     def hover(
@@ -323,8 +325,11 @@ class World:
         theta: tuple[npt.ArrayLike, ...],
         named: Mapping[str, npt.ArrayLike],
         **arguments: npt.ArrayLike | None,
-    ) -> tuple[npt.NDArray[np.void], tuple[int, ...]]:
-        """Checked, broadcast and flattened rollout specifications, and the shape they had."""
+    ) -> tuple[Callable[[slice], npt.NDArray[np.void]], tuple[int, ...]]:
+        """What gives a part of the checked, broadcast and flattened specifications, and the shape that all have.
+
+        A specification has room for a long policy, so those of a large batch are not made at once.
+        """
         if start not in START_CODES:
             raise ArgumentError(f"start: value {start!r} is unknown (allowed {', '.join(START_CODES)})")
         for name, value, needed in (("d_ceil_m", arguments["d_ceil_m"], "at_trigger"), ("state", state, "state")):
@@ -345,19 +350,29 @@ class World:
         except ValueError as error:
             told = ", ".join(f"{name} {shape}" for name, shape in shapes.items() if shape)
             raise ArgumentError(f"the arguments do not broadcast: {told}") from error
-        specs = self._library.default_specs(int(np.prod(shape, dtype=np.int64)))
-        specs["start"], specs["form"] = START_CODES[start], form.number
-        specs["stream"] = np.arange(specs.size, dtype=np.uint64)
+        n, flat = math.prod(shape), {}
         for name, array in given.items():
             self._check_range(name, array)
             whole = (*shape, array.shape[-1]) if name in vectors else shape
-            specs[name] = np.broadcast_to(array, whole).reshape(specs[name].shape)
+            flat[name] = np.broadcast_to(array, whole).reshape((n, *whole[len(shape) :]))
+
+        def specs(part: slice) -> npt.NDArray[np.void]:
+            records = self._library.default_specs(part.stop - part.start)
+            records["start"], records["form"] = START_CODES[start], form.number
+            records["stream"] = np.arange(part.start, part.stop, dtype=np.uint64)
+            for name, array in flat.items():
+                if name == "theta":
+                    records[name][:, : form.n] = array[part]
+                else:
+                    records[name] = array[part]
+            return records
+
         return specs, shape
 
     def _theta(
         self, form: forms.Form, theta: tuple[npt.ArrayLike, ...], named: Mapping[str, npt.ArrayLike]
     ) -> FloatArray:
-        """Parameters in SI units with zeros behind them, shape (..., 64)."""
+        """Parameters in SI units, shape (..., n)."""
         rest = form.names[len(theta) :]
         if len(theta) > form.n or set(named) != set(rest):
             given = ", ".join([f"{len(theta)} in order", *named])
@@ -371,9 +386,7 @@ class World:
         except ValueError as error:
             shapes = ", ".join(f"{name} {column.shape}" for name, column in zip(form.names, columns, strict=True))
             raise ArgumentError(f"the arguments do not broadcast: {shapes}") from error
-        padded = np.zeros((*stacked.shape[:-1], self._library.spec_fields["theta"].count))
-        padded[..., : form.n] = form.to_si(stacked)
-        return padded
+        return form.to_si(stacked)
 
     def _check_range(self, name: str, array: npt.NDArray[Any]) -> None:
         if array.dtype == np.uint64:

@@ -12,7 +12,8 @@ import pytest
 from form_six import POLICY_SIX, SIX
 from small_sweep import fly, make
 
-from ivl import campaign, landing
+from ivl import landing
+from ivl import run as ivl_run
 from ivl.analysis.policy import recommended
 from ivl.cli import run
 from ivl.experiment import Experiment
@@ -127,7 +128,7 @@ def test_people_read_symbols_and_units_of_the_form(capsys: Capture, six_file: Pa
 
 
 def test_a_rollout_of_a_run_is_a_landing_by_its_specification(six: Experiment, tmp_path: Path) -> None:
-    result = campaign.run(six, tmp_path / "run")
+    result = ivl_run.run(six, tmp_path / "run")
     spec = landing.of_rollout(six, 0, result.rollouts.theta[5].tolist(), int(result.rollouts.stream[5]))
     _, trace = spec.fly()
     assert trace.outcome.t_end_s == result.rollouts.outcomes["t_end_s"][5]
@@ -165,7 +166,7 @@ def test_a_trial_of_a_sweep_is_a_run_of_learn(swept: Path, tmp_path: Path) -> No
     row = trials.iloc[3]
     chosen = sweep.experiment(str(row["gear"]), float(row["speed_mps"]), float(row["angle_deg"]), int(row["trial"]))
     check = chosen.check.model_copy(update={"effort": 0.01, "n_fresh": 5})
-    result = campaign.run(chosen.model_copy(update={"check": check}), tmp_path / "run")
+    result = ivl_run.run(chosen.model_copy(update={"check": check}), tmp_path / "run")
     assert result.summary["mu"] == [row[f"mu_{name}"] for name in NAMES]
 
 

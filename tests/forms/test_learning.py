@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from form_six import policy_most
 
-from ivl import assess, campaign, experiment, forms
+from ivl import assess, experiment, forms
+from ivl import run as ivl_run
 from ivl.experiment import Experiment
 from ivl.learners import LEARNERS
 from ivl.links import pil
@@ -47,10 +48,10 @@ def test_every_learner_learns_it_with_the_same_bits_twice_and_after_an_interrupt
     six: Experiment, learner: str, tmp_path: Path
 ) -> None:
     chosen = with_learner(six, learner)
-    runs = [campaign.run(chosen, tmp_path / name) for name in ("one", "two")]
+    runs = [ivl_run.run(chosen, tmp_path / name) for name in ("one", "two")]
     with pytest.raises(KeyboardInterrupt):
-        campaign.run(chosen, tmp_path / "cut", hooks=campaign.Hooks(on_episode=until_episode(2)))
-    campaign.run(chosen, tmp_path / "cut", resume=True)
+        ivl_run.run(chosen, tmp_path / "cut", hooks=ivl_run.Hooks(on_episode=until_episode(2)))
+    ivl_run.run(chosen, tmp_path / "cut", resume=True)
     whole = rows_of(tmp_path / "one")
     assert whole == rows_of(tmp_path / "two") == rows_of(tmp_path / "cut")
     assert len(whole[0]) == chosen.budget
@@ -60,7 +61,7 @@ def test_every_learner_learns_it_with_the_same_bits_twice_and_after_an_interrupt
 
 
 def test_columns_of_the_store_have_the_names_of_the_form(six: Experiment, tmp_path: Path) -> None:
-    campaign.run(six, tmp_path / "run")
+    ivl_run.run(six, tmp_path / "run")
     with sqlite3.connect(tmp_path / "run" / "run.sqlite") as db:
         rollout = [row[1] for row in db.execute("PRAGMA table_info(rollout)")]
         episode = [row[1] for row in db.execute("PRAGMA table_info(episode)")]
@@ -71,10 +72,10 @@ def test_columns_of_the_store_have_the_names_of_the_form(six: Experiment, tmp_pa
 
 
 def test_a_link_and_the_emulated_chip_store_the_same_bits(six: Experiment, tmp_path: Path) -> None:
-    campaign.run(six, tmp_path / "here")
+    ivl_run.run(six, tmp_path / "here")
     with SilProcess(six.make_world()) as server:
-        campaign.run(six, tmp_path / "link", uri=server.uri)
-    campaign.run(six, tmp_path / "chip", uri="pil://")
+        ivl_run.run(six, tmp_path / "link", uri=server.uri)
+    ivl_run.run(six, tmp_path / "chip", uri="pil://")
     here = rows_of(tmp_path / "here")
     assert rows_of(tmp_path / "link") == here
     assert rows_of(tmp_path / "chip") == here
@@ -98,10 +99,10 @@ def test_the_best_policy_is_found_by_repeated_long_searches(six: Experiment, tmp
     world = six.make_world()
     best = assess.find_best(world, six, on_stage=lambda k, n: stages.append((k, n)))
     assert best == assess.find_best(world, six, threads=1)
-    assert best.search == "2 searches of 64 rollouts, the best refined in 3 clouds of 320 policies"
+    assert best.search == "2 searches of 64 rollouts at most, the best refined in 3 clouds of 320 policies"
     assert stages == [(k, 6) for k in range(6)]
     assert len(best.theta) == 6
-    result = campaign.run(six, tmp_path / "run")
+    result = ivl_run.run(six, tmp_path / "run")
     assert result.best == best
     assert result.summary["best"]["search"] == best.search
 

@@ -143,3 +143,14 @@ def test_a_real_run_is_judged_from_its_store(small: Experiment, world: ivl.World
         verdicts = assess.judge(world, small, BEST, store.episodes(), store.rollouts())
         failed = (store.rollouts(trial=1).outcomes["n_legs"] < 3).sum()
     assert verdicts[1].failed_landings_total == failed
+
+
+def test_a_search_goes_on_where_the_vehicle_refuses_a_part_of_the_box(
+    small: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(assess, "GRID_DIMENSIONS_MAX", 1)
+    chosen = small.model_copy(update={"check": small.check.model_copy(update={"effort": 0.05})})
+    world = ivl.World("habas2021", "wide_short", "as_simulated", **{"firmware.flip_moment_max": 0.0085})
+    best = assess.find_best(world, chosen)
+    assert best.rate_four_leg > 0.5
+    assert best.theta[1] <= 8.5

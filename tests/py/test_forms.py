@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import ivl
-from ivl import experiment, forms, landing, yamlfile
+from ivl import experiment, forms, landing, native, yamlfile
 from ivl.cli.policy_options import theta_of
-from ivl.errors import ArgumentError, ConfigError
+from ivl.errors import ArgumentError, ConfigError, NativeError
 from ivl.forms import Form, Parameter
 from ivl.landing import LandingSpec
 
@@ -245,3 +245,35 @@ def test_options_that_say_no_policy_are_refused(
     with pytest.raises(ConfigError) as caught:
         theta_of(name, theta, rrev, moment)
     assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("limit", "a word of SQL"),
+        ("speed_mps", "taken"),
+        ("Seed", "taken"),
+        ("trial", "taken"),
+        ("a b", "no word"),
+        ("", "no word"),
+        ("1st", "no word"),
+    ],
+)
+def test_a_parameter_whose_name_can_be_no_column_is_refused(name: str, why: str) -> None:
+    parameter = forms.Parameter(name, "x", "1", 1.0, 0.0, 1.0, "a test")
+    with pytest.raises(NativeError, match=why):
+        forms._check_names(forms.Form(9, "own", "a test", (parameter,)))
+
+
+def test_two_parameters_of_one_name_are_refused() -> None:
+    twice = tuple(forms.Parameter(name, "x", "1", 1.0, 0.0, 1.0, "a test") for name in ("gain", "Gain"))
+    with pytest.raises(NativeError, match="'Gain': it is taken"):
+        forms._check_names(forms.Form(9, "own", "a test", twice))
+
+
+def test_a_range_ends_where_its_source_says() -> None:
+    field = native.Field(
+        "gain", "f4", 0, 1, "d", float(np.float32(0.1)), float(np.float32(0.3)), float(np.float32(0.1)), ""
+    )
+    parameter = forms._parameter("g", field)
+    assert (parameter.lo, parameter.hi, parameter.si) == (1.0, 3.0, 0.1)

@@ -195,3 +195,12 @@ def test_the_files_that_the_design_sends_people_to_are_there() -> None:
             name,
             path,
         )
+
+
+def test_an_override_that_contradicts_the_estimator_is_refused() -> None:
+    data = {"vehicle": "habas2021", "gear": "wide_long", "speed_mps": 2.5, "angle_deg": 90.0}
+    source = {"value": 0.0, "unit": "1", "source": "a test"}
+    with pytest.raises(ConfigError, match=r"overrides\.firmware\.d_source: 0 contradicts estimator 'kalman'"):
+        yamlfile.validate(Task, {**data, "estimator": "kalman", "overrides": {"firmware.d_source": source}}, "a.yaml")
+    agreed = {**data, "estimator": "known_height", "overrides": {"firmware.d_source": source}}
+    assert yamlfile.validate(Task, agreed, "a.yaml").world_settings()["firmware.d_source"] == 0.0

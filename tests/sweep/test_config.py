@@ -104,3 +104,9 @@ def test_tasks_are_small_enough_to_share_and_large_enough_to_pay() -> None:
     large = paper.model_copy(update={"trials": 50_000})
     assert plan.good_size(large, 2) == plan.SIZE_MAX
     assert plan.good_size(large, 10_000) == 1000  # tasks end no faster than the client takes them back
+
+
+def test_a_start_that_is_drawn_is_not_varied(tmp_path: Path) -> None:
+    drawn = {"rrev_c_per_s": [1.0, 5.0], "moment_y_Nmm": [3.0, 8.0]}
+    with pytest.raises(ConfigError, match="mu0_range draws the start of every trial"):
+        make(tmp_path, mu0_range=drawn, vary={"policy.rrev_c_per_s.mu0": [3.0, 5.0]})

@@ -5,12 +5,16 @@ says so. A check never changes what the vehicle does.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from ivl import native
-from ivl.experiment import Experiment
+from ivl.experiment import Experiment, Policy
 from ivl.links import sil
 from ivl.links.packets import Phase
 from ivl.links.vehicle import Supervisor, Vehicle
@@ -21,6 +25,7 @@ SIGMA_M_MAX, SIGMA_S = 0.1, 10.0
 _LINK_S, _PING_S, _PONG_S = 3.0, 0.02, 0.5
 _TYPES = {"f4": "<f", "u1": "<B", "u2": "<H", "u4": "<L"}
 _CONTROLLER_APP = 6
+_CORNER_DIMENSIONS_MAX = 8
 
 
 @dataclass(frozen=True)
@@ -161,8 +166,7 @@ def policy_range(vehicle: Vehicle, experiment: Experiment) -> Check:
     """The bounds of the search lie within what the vehicle will accept."""
     del vehicle
     model, policy = experiment.make_world().native_model, experiment.policy
-    corners = [[low for low, _ in policy.bounds], policy.mu0, [high for _, high in policy.bounds]]
-    ok = all(model.accepts(policy.shape.number, policy.shape.to_si(theta)) for theta in corners)
+    ok = all(model.accepts(policy.shape.number, policy.shape.to_si(theta)) for theta in _corners(policy))
     spans = zip(policy.shape.params, policy.bounds, strict=True)
     most_Nmm = 1e3 * float(model.config()[0]["ivl.flip_moment_max"][0])
     return Check(
@@ -170,6 +174,18 @@ def policy_range(vehicle: Vehicle, experiment: Experiment) -> Check:
         f"accepted by the flight core; moments up to {most_Nmm:g} N mm",
         "change policy.*.bounds of the experiment, or firmware.flip_moment_max",
     )  # fmt: skip
+
+
+def _corners(policy: Policy) -> Iterable[npt.ArrayLike]:
+    """Where a box may stick out: its corners, or as many random ones as can be asked; and where the search begins."""
+    yield policy.mu0
+    if policy.shape.n <= _CORNER_DIMENSIONS_MAX:
+        yield from product(*policy.bounds)
+        return
+    bounds = np.array(policy.bounds)
+    yield from bounds.T
+    choices = np.random.default_rng(0).integers(0, 2, (2**_CORNER_DIMENSIONS_MAX, len(bounds)))
+    yield from np.where(choices == 0, bounds[:, 0], bounds[:, 1])
 
 
 def configuration(vehicle: Vehicle, experiment: Experiment) -> Check:

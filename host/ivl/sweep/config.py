@@ -11,6 +11,7 @@ grouped, where and in which order they run, or how often a run was cut off. The 
 of two learners are paired, like the seeds of `ivl learn`, and `ivl learn --seed RUN_SEED` repeats a trial.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -237,6 +238,9 @@ class Sweep(_Grid):
     def _consistent(self) -> Self:
         if self.budget % self.n_rollouts:
             raise ValueError(f"budget {self.budget} is not a multiple of n_rollouts {self.n_rollouts}")
+        starts = [path for path in self.vary if re.fullmatch(r"policy\.\w+\.mu0", path)]
+        if self.mu0_range is not None and starts:
+            raise ValueError(f"vary: {starts[0]}: mu0_range draws the start of every trial")
         for name, parameter, (lo, hi) in self._starts():
             if not parameter.bounds[0] <= lo <= hi <= parameter.bounds[1]:
                 raise ValueError(f"mu0_range.{name}: {[lo, hi]} must lie in order inside the bounds {parameter.bounds}")
