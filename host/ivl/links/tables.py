@@ -55,10 +55,6 @@ class Session(Connection):
         """Whether the vehicle has this parameter."""
         return self._element(self.cf.param.toc, name) is not None
 
-    def has_group(self, group: str) -> bool:
-        """Whether the vehicle has parameters of this group."""
-        return group in self.cf.param.toc.toc
-
     def param_type(self, name: str) -> str:
         """Type of a parameter as in the `struct` module, for example "<f"."""
         return str(self._param(name).pytype)
