@@ -2,6 +2,7 @@
 
 import struct
 import time
+import zlib
 
 import cflib.crtp
 from cflib.crazyflie.log import LogConfig
@@ -21,9 +22,11 @@ with SyncCrazyflie(uri_from_env(default="udp://127.0.0.1:19850")) as scf:
     time.sleep(0.5)
     cf.high_level_commander.takeoff(1.0, 2.0)
     time.sleep(3.0)
-    cf.appchannel.send_packet(struct.pack("<BBLff", 1, 1, number, 3.9, 0.0065))  # flip at RREV 3.9 1/s with 6.5 N mm
+    theta = struct.pack("<ff", 3.9, 0.0065)  # flip at RREV 3.9 1/s with 6.5 N mm
+    head = struct.pack("<BBLLBBB", 1, 2, number, zlib.crc32(b"constant" + theta), 0, 2, 0)  # form 0, 2 numbers, part 0
+    cf.appchannel.send_packet(head + theta + bytes(8))
     for n, request in enumerate([1] * 30 + [2] * 50):  # 1: hover, 2: approach, upwards at 2.5 m/s; at least 10 a second
-        cf.appchannel.send_packet(struct.pack("<BBHBfffff", 2, 1, n, request, 0.0, 0.0, 1.0, 2.5, 1.57))
+        cf.appchannel.send_packet(struct.pack("<BBHBfffff", 2, 2, n, request, 0.0, 0.0, 1.0, 2.5, 1.57))
         time.sleep(0.05)
     with SyncLogger(scf, snapshot) as log:
         _, seen, _ = next(log)

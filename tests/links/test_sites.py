@@ -136,7 +136,7 @@ def test_site_hears_of_refusals_and_faults(server: SilProcess, monkeypatch: pyte
     with CrazyflieSource(server.uri, weak) as source:
         site = hall_of(source)
         refused, _ = source.fly(plan_of((4.8, 12.0), GOOD))
-        assert refused.discarded.startswith("vehicle: policy RREV_c 4.8 1/s, M_yd 12 N mm")
+        assert refused.discarded.startswith("vehicle: policy constant: RREV_c 4.8 1/s, M_yd 12 N mm")
         assert site.calls == ["ready", "prove", "start", "refusal", "start", "approach"]
         del site.calls[:]
         monkeypatch.setattr(site, "before_approach", open_the_door)

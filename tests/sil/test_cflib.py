@@ -4,6 +4,7 @@ import ast
 import itertools
 import os
 import struct
+import zlib
 import subprocess
 import sys
 import threading
@@ -249,9 +250,11 @@ def test_app_answers_on_its_channel(sil, connected, wait_for):
     with connected(sil.uri) as cf:
         answers: list[bytes] = []
         cf.appchannel.packet_received.add_callback(lambda data: answers.append(bytes(data)))
-        cf.appchannel.send_packet(struct.pack("<BBLff", 1, 1, 7, 4.8, 0.008))
+        theta = struct.pack("<ff", 4.8, 0.008)
+        head = struct.pack("<BBLLBBB", 1, 2, 7, zlib.crc32(b"constant" + theta), 0, 2, 0)
+        cf.appchannel.send_packet(head + theta + bytes(8))
         wait_for("the echo", lambda: answers)
-        assert answers[0][:6] == struct.pack("<BBL", 0x81, 1, 7)
+        assert answers[0][:7] == struct.pack("<BBLb", 0x81, 2, 7, 0)
         cf.appchannel.send_packet(b"nonsense")
         wait_for("the count", lambda: sil.get("ivl.n_bad_packet") == 1)
 
