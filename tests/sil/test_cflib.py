@@ -4,11 +4,11 @@ import ast
 import itertools
 import os
 import struct
-import zlib
 import subprocess
 import sys
 import threading
 import time
+import zlib
 from pathlib import Path
 from typing import Any
 
