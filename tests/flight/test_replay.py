@@ -313,10 +313,10 @@ def test_core_that_may_not_begin_names_its_rule(log: Flight) -> None:
 
 
 def test_policy_out_of_range_is_one_line(world: World, log: Flight) -> None:
-    wanted = r"^flight 2\.5 m/s: policy: rrev_c_per_s: value 25\.0 is out of range \(allowed 0 \.\. 20 1/s\)$"
+    wanted = r"^flight 2\.5 m/s: policy: form constant: rrev_c_per_s: value 25\.0 is out of range \(allowed 0 \.\. 20 1/s\)$"
     with pytest.raises(ConfigError, match=wanted):
         replay.replay([changed(log, threshold_per_s=25.0)], world)
-    with pytest.raises(ConfigError, match="policy: moment_y_Nmm: value"):
+    with pytest.raises(ConfigError, match="policy: form constant: moment_y_Nmm: value"):
         replay.replay([changed(log, moment_Nmm=float("inf"))], world)
 
 
@@ -398,7 +398,7 @@ def test_command_prints_one_object_or_a_table(
 def test_command_refuses_in_one_line(tmp_path: Path, log: Flight, capsys: pytest.CaptureFixture[str]) -> None:
     flights = folder(tmp_path / "flights", changed(log, threshold_per_s=25.0))
     for words, message in (
-        ([flights], "policy: rrev_c_per_s: value 25.0 is out of range"),
+        ([flights], "policy: form constant: rrev_c_per_s: value 25.0 is out of range"),
         ([flights, "--uri", "radio://0"], "allowed pil://"),
         ([flights, "--plot", "a.gif"], "unknown kind of file (allowed .png, .svg, .pdf)"),
         ([str(tmp_path / "none")], "this is no folder of flights"),
