@@ -313,7 +313,10 @@ def test_core_that_may_not_begin_names_its_rule(log: Flight) -> None:
 
 
 def test_policy_out_of_range_is_one_line(world: World, log: Flight) -> None:
-    wanted = r"^flight 2\.5 m/s: policy: form constant: rrev_c_per_s: value 25\.0 is out of range \(allowed 0 \.\. 20 1/s\)$"
+    wanted = (
+        r"^flight 2\.5 m/s: policy: form constant: rrev_c_per_s: value 25\.0 is out of range "
+        r"\(allowed 0 \.\. 20 1/s\)$"
+    )
     with pytest.raises(ConfigError, match=wanted):
         replay.replay([changed(log, threshold_per_s=25.0)], world)
     with pytest.raises(ConfigError, match="policy: form constant: moment_y_Nmm: value"):
