@@ -69,6 +69,20 @@ def test_tables_and_values_are_those_of_the_vehicle(sil, connected):
 # ---- parameters
 
 
+def set_confirmed(cf: Any, name: str, value: float) -> None:
+    """Set a parameter and wait for the vehicle's answer."""
+    answered = threading.Event()
+
+    def on_update(*_: Any) -> None:
+        answered.set()
+
+    group, _, last = name.partition(".")
+    cf.param.add_update_callback(group, last, on_update)
+    cf.param.set_value(name, value)
+    assert answered.wait(60.0), f"{name} was never acknowledged"
+    cf.param.remove_update_callback(group, last, on_update)
+
+
 def test_parameter_is_set_and_confirmed(sil, connected, wait_for):
     with connected(sil.uri) as cf:
         confirmed = []
@@ -94,7 +108,8 @@ def test_defaults_and_persistent_values(sil, connected, wait_for):
             return answers[0]
 
         assert ask(cf.param.persistent_get_state) == (False, default, None)
-        cf.param.set_value(name, 0 if default else 1)
+        # cflib sends a new value from a thread of its own, and the request to store at once: the value must be there first
+        set_confirmed(cf, name, 0 if default else 1)
         assert ask(cf.param.persistent_store)
         state = ask(cf.param.persistent_get_state)
         assert state.is_stored
