@@ -46,10 +46,11 @@ ivl_reference_t ivl_approach_next(const ivl_cfg_t *cfg, ivl_approach_t *approach
         dv_mps = (brake_mps > 0.0f) ? -brake_mps : dv_mps;
     }
 
+    approach->accel_mps2 = dv_mps * cfg->tick_hz;
     const ivl_reference_t ref = {
         .p_W_m = approach->p_W_m,
         .v_W_mps = ivl_scale(dir, approach->speed_mps),
-        .a_W_mps2 = ivl_scale(dir, dv_mps * cfg->tick_hz),
+        .a_W_mps2 = ivl_scale(dir, approach->accel_mps2),
     };
 
     // constant acceleration over the tick

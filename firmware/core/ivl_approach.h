@@ -26,6 +26,7 @@ typedef struct
     float      dir_x;  ///< direction of the path in W, unit length
     float      dir_z;
     float      speed_mps;   ///< present speed along the path
+    float      accel_mps2;  ///< its change in the last tick, per second
     float      target_mps;  ///< speed to be reached
     float      last_mps;    ///< shape RREV: speed at which holding RREV ends
     bool       closing;     ///< shape RREV: RREV is being held

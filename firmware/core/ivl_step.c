@@ -4,6 +4,7 @@
 
 #include "ivl.h"
 #include "ivl_landing.h"
+#include "ivl_level_out.h"
 #include "ivl_maneuver.h"
 
 void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state)
@@ -96,6 +97,10 @@ static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, fl
         break;
     case IVL_DRIVE_APPROACH:
         ref = ivl_approach_next(cfg, &state->approach, rrev_per_s, state->derived.dt_s);
+        track(cfg, state, &ref, thrust_N);
+        break;
+    case IVL_DRIVE_LEVEL:
+        ref = ivl_level_out_next(cfg, state);
         track(cfg, state, &ref, thrust_N);
         break;
     case IVL_DRIVE_FLIP:
