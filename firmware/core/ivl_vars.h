@@ -74,7 +74,7 @@
     X(uint8_t, "ivl", "shape", shape, "1", 0, 3, 0, "approach: 0 accelerate and hold, 1 accelerate, 2 hold RREV for a while, 3 into the region")\
     X(float, "ivl", "shape_rrev", shape_rrev_per_s, "1/s", 0.1, 20.0, 3.0, "shape 2: RREV that is held")                                     \
     X(float, "ivl", "shape_speed", shape_speed_norm, "1", 0.05, 1.0, 0.6, "shape 2: part of the speed at which holding RREV ends")           \
-    X(float, "ivl", "region_vx", region_vx_mps, "m/s", 0.0, 5.0, 1.0, "shape 3: at least this fast along the ceiling")                       \
+    X(float, "ivl", "region_vx", region_vx_mps, "m/s", 0.0, 5.0, 1.2, "shape 3: at least this fast along the ceiling")                       \
     X(float, "ivl", "region_vz", region_vz_mps, "m/s", 0.0, 5.0, 2.0, "shape 3: at least this fast towards the ceiling")                     \
     X(float, "ivl", "region_rrev", region_rrev_per_s, "1/s", 0.5, 20.0, 4.0, "shape 3: that fast before RREV is this, a little less than a flip needs")\
     X(float, "ivl", "thrust_use", thrust_use_norm, "1", 0.05, 1.0, 0.8, "shape 3: part of the thrust beyond the weight that may be used to accelerate")\

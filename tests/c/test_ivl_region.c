@@ -41,7 +41,7 @@ static float root_of_the_quadratic(float a, float rrev, float d_m, float v0)
 static void test_with_enough_room_the_aim_is_the_region_or_what_is_asked_beyond_it(void)
 {
     const ivl_cfg_t cfg = region_cfg();
-    const float     in[][4] = {{0.0f, 0.25f, 1.0f, 2.0f}, {3.0f, 0.5f, 3.0f, 2.0f}, {0.2f, 3.5f, 1.0f, 3.5f}, {1.5f, 2.5f, 1.5f, 2.5f}};
+    const float     in[][4] = {{0.0f, 0.25f, 1.2f, 2.0f}, {3.0f, 0.5f, 3.0f, 2.0f}, {0.2f, 3.5f, 1.2f, 3.5f}, {1.5f, 2.5f, 1.5f, 2.5f}};
     for (int i = 0; i < 4; i++)
     {
         const ivl_aim_t aim = aim_from_rest(&cfg, 4.0f, in[i][0], in[i][1]);
@@ -280,7 +280,7 @@ static void test_distance_that_comes_later_corrects_the_aim_once(void)
     const ivl_cfg_t cfg = region_cfg();
     ivl_approach_t  approach;
     ivl_approach_begin(&cfg, &approach, &UNKNOWN, ORIGIN, ORIGIN, 0.5f, IVL_HALF_PI);
-    TEST_ASSERT_EQUAL_FLOAT(1.0f, approach.aim.vx_mps);
+    TEST_ASSERT_EQUAL_FLOAT(1.2f, approach.aim.vx_mps);
     TEST_ASSERT_EQUAL_FLOAT(2.0f, approach.aim.vz_mps);
     const ivl_room_t bad[] = {{0.0f, 0.0f}, {NAN, 0.0f}, {INFINITY, 0.0f}, {-1.0f, 0.0f}, {5.1f, 0.0f}};
     for (int i = 0; i < 50; i++)
@@ -336,8 +336,18 @@ static void test_core_tells_the_approach_its_distance_and_battery(void)
     fix_request(&fix, IVL_REQUEST_HOVER);
     fix_request(&fix, IVL_REQUEST_APPROACH);
     TEST_ASSERT_EQUAL_INT(IVL_PHASE_APPROACH, fix.state.phase);
-    TEST_ASSERT_EQUAL_MEMORY(&fix.state.approach.aim, &(ivl_aim_t){1.0f, 2.0f, 4.3f}, sizeof(ivl_aim_t));
     TEST_ASSERT_FALSE(fix.state.approach.open);
+    TEST_ASSERT_EQUAL_FLOAT(1.2f, fix.state.approach.aim.vx_mps);
+    TEST_ASSERT_EQUAL_FLOAT(2.0f, fix.state.approach.aim.vz_mps);
+    TEST_ASSERT_EQUAL_FLOAT(4.3f, fix.state.approach.aim.accel_mps2);
+    // the same with a battery of half the voltage: a quarter of the thrust, with which nothing can fly
+    fix_request(&fix, IVL_REQUEST_HOVER);
+    fix.in.vitals = (ivl_vitals_t){.given = 1u, .configured = 1u, .can_fly = 1u, .stock_idle = 1u, .vbat_V = 0.5f * 3.7f};
+    fix.cfg.vbat_V_min = 1.0f;
+    fix_request(&fix, IVL_REQUEST_APPROACH);
+    TEST_ASSERT_EQUAL_INT(IVL_PHASE_APPROACH, fix.state.phase);
+    TEST_ASSERT_EQUAL_FLOAT(0.1f, fix.state.approach.aim.accel_mps2);
+    TEST_ASSERT_TRUE(fix.state.approach.aim.vz_mps < 1.0f);
 }
 
 static void test_core_aims_anew_when_an_estimator_has_its_first_distance(void)
