@@ -145,7 +145,7 @@ def test_a_landing_takes_theta_or_named_parameters() -> None:
     [
         ({}, "theta: is missing"),
         ({"rrev_c_per_s": 4.8}, "moment_y_Nmm: is missing (the form constant has rrev_c_per_s, moment_y_Nmm)"),
-        ({"theta": [4.8, 8.0], "moment_y_Nmm": 8.0}, "theta: moment_y_Nmm says it, too"),
+        ({"theta": [4.8, 8.0], "moment_y_Nmm": 8.0}, "theta: already given by moment_y_Nmm"),
         ({"theta": [4.8]}, "a policy of the form constant has 2 parameters"),
         ({"theta": [4.8, 30.0]}, "form constant: moment_y_Nmm: value 30.0 is out of range (allowed 0 .. 20 N mm)"),
         ({"theta": [4.8, 8.0], "form": "linear"}, "policy form 'linear' is unknown (allowed constant)"),
@@ -229,8 +229,8 @@ def test_options_say_the_papers_policy_in_two_ways(
     [
         ("constant", None, 4.8, None, "--moment is missing"),
         ("constant", None, None, None, "--rrev is missing"),
-        ("constant", "4.8,8", 4.8, None, "--theta: --rrev says it, too"),
-        ("constant", "4.8,8", None, 8.0, "--theta: --moment says it, too"),
+        ("constant", "4.8,8", 4.8, None, "--theta: already given by --rrev"),
+        ("constant", "4.8,8", None, 8.0, "--theta: already given by --moment"),
         ("constant", "4.8", None, None, "policy: a policy of the form constant has 2 parameters"),
         ("constant", "4.8,x", None, None, "--theta 4.8,x: numbers with commas between them are needed"),
         ("constant", "", None, None, "--theta : numbers with commas between them are needed"),
