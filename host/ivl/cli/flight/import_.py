@@ -51,7 +51,7 @@ def import_(
     judged_by: Annotated[str, typer.Option(help="Who saw the outcomes.")] = "operator",
     attempts: Annotated[str, typer.Option(metavar="last|all", help="Which attempts of a rollout.")] = "last",
     maps: Annotated[
-        list[str] | None, typer.Option("--map", metavar="COLUMN=VARIABLE[*FACTOR]", help="Read a column from a variable.")
+        list[str] | None, typer.Option("--map", metavar="COLUMN=VARIABLE[*FACTOR]", help="The variable of a column.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
