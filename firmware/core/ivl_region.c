@@ -46,7 +46,7 @@ static float battery_share(const ivl_cfg_t *cfg, float vbat_V)
     return share * share;
 }
 
-// Acceleration a along a direction (dir_z: its part upwards) for which the rotors have to make A: |a dir + g e3| = A     [MODEL eq. 19.2]
+// Acceleration a along a direction (dir_z: its part upwards) for which the rotors have to make A: |a dir + g e3| = A     [MODEL eq. 15.2]
 static float accel_mps2(const ivl_cfg_t *cfg, float vbat_V, float dir_z)
 {
     const float g = cfg->gravity_mps2;
@@ -57,7 +57,7 @@ static float accel_mps2(const ivl_cfg_t *cfg, float vbat_V, float dir_z)
     return ivl_clamp(a, ACCEL_MPS2_MIN, most(cfg->approach_accel_mps2, ACCEL_MPS2_MIN));
 }
 
-// Largest v_z that is reached before v_z / d is region_rrev: the vehicle rises (v_0 + v_z) |dv| / 2a meanwhile            [MODEL eq. 19.3]
+// Largest v_z that is reached before v_z / d is region_rrev: the vehicle rises (v_0 + v_z) |dv| / 2a meanwhile            [MODEL eq. 15.3]
 static float vz_within(const ivl_cfg_t *cfg, float room_m, float v0x_mps, float v0z_mps, const ivl_aim_t *aim)
 {
     const float dx = aim->vx_mps - v0x_mps, per_2a = 0.5f / aim->accel_mps2, delay_s = 1.0f / cfg->region_rrev_per_s;
@@ -73,7 +73,7 @@ static float vz_within(const ivl_cfg_t *cfg, float room_m, float v0x_mps, float 
     return vz;
 }
 
-// Largest v_x with v_x t + v_x^2 / 2a within the room, t = d / v_z: a straight path from rest to the ceiling, then braking    [MODEL eq. 19.4]
+// Largest v_x with v_x t + v_x^2 / 2a within the room, t = d / v_z: a straight path from rest to the ceiling, then braking    [MODEL eq. 15.4]
 static float vx_within(const ivl_cfg_t *cfg, float room_m, float t_s)
 {
     const float a = cfg->approach_accel_mps2;

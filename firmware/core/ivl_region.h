@@ -1,5 +1,5 @@
 /// @file ivl_region.h
-/// Shape REGION of the approach: the velocity at which the vehicle is to meet the ceiling.  Pure.                    [MODEL section 19]
+/// Shape REGION of the approach: the velocity at which the vehicle is to meet the ceiling.  Pure.                    [MODEL section 15]
 ///
 /// A policy lands well in a region of velocities only, at least region_vx along the ceiling and region_vz towards it.  The aim is the commanded
 /// velocity, each component raised to that; then

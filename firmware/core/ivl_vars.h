@@ -20,7 +20,7 @@
     X(float, "ivl", "arm_y", arm_y_m, "m", 0.005, 0.2, 0.033, "distance of each motor from the b_x axis")                                    \
     X(float, "ivl", "torque_per_thrust", torque_per_thrust_m, "m", 1.0e-4, 0.1, 0.00612, "drag torque of a rotor per thrust")                \
     X(float, "ivl", "motor_thrust_max", motor_thrust_N_max, "N", 0.01, 5.0, 0.1615, "largest thrust of one motor")                           \
-    X(float, "ivl", "motor_lag", motor_lag_s, "s", 0.0, 0.5, 0.0, "time constant with which the thrust falls")                               \
+    X(float, "ivl", "motor_lag", motor_lag_s, "s", 0.0, 0.5, 0.0, "constant with which the thrust falls")                                    \
     X(float, "ivl", "vbat_rated", vbat_V_rated, "V", 0.0, 30.0, 3.7, "battery below this gives less than motor_thrust_max; 0: it always gives that")\
     X(float, "ivl", "d_touch", d_touch_m, "m", -0.2, 0.5, 0.02, "distance of the plane at which a level vehicle touches the ceiling")        \
     X(float, "ivl", "h_ceil", h_ceil_m, "m", -100.0, 100.0, 2.1, "height in W of the plane that the cues refer to")
