@@ -117,6 +117,8 @@ def check_abort(vehicle: Vehicle) -> None:
 def start_point(world: World, experiment: Experiment) -> Point:
     """Where an approach has to begin so that full speed is held before the ceiling, and x = 0 is reached at it.
 
+    `start.room` can lower the start, not move it along x: an approach of shape `region` chooses its own direction.
+
     Raises:
         ConfigError: That is below the floor.
     """
@@ -125,10 +127,11 @@ def start_point(world: World, experiment: Experiment) -> Point:
     hold_s = float(world.params.values["start.hold_time"])
     speed_mps, angle_rad = experiment.speed_mps, math.radians(experiment.angle_deg)
     path_m = 0.5 * speed_mps**2 / accel_mps2 + speed_mps * hold_s
-    start = (-path_m * math.cos(angle_rad), 0.0, h_ceil_m - path_m * math.sin(angle_rad))
+    drop_m = max(path_m * math.sin(angle_rad), float(world.params.values["start.room"]))
+    start = (-path_m * math.cos(angle_rad), 0.0, h_ceil_m - drop_m)
     if start[2] < HEIGHT_M_MIN:
         raise ConfigError(
-            f"speed_mps: value {speed_mps:g} m/s at {experiment.angle_deg:g} degrees needs {path_m:.2f} m below a "
+            f"speed_mps: value {speed_mps:g} m/s at {experiment.angle_deg:g} degrees needs {drop_m:.2f} m below a "
             f"ceiling at {h_ceil_m:.2f} m: the start would be {start[2]:.2f} m above the floor (allowed from "
             f"{HEIGHT_M_MIN} m)"
         )
