@@ -6,6 +6,7 @@ included.
 """
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
@@ -185,8 +186,17 @@ class Experiment(Task, Named):
 
 
 def list_experiments() -> list[str]:
-    """Experiments that ship with the package, as paths that `load` takes."""
-    return [f"experiments/{path.name}" for path in sorted(EXPERIMENTS_DIR.glob("*.yaml"))]
+    """Experiments that ship with the package, as paths that `load` takes; those of `ivl.policy` are not among them."""
+    return [f"experiments/{path.name}" for path in sorted(EXPERIMENTS_DIR.glob("*.yaml")) if not _is_general(path)]
+
+
+def list_general() -> list[str]:
+    """Experiments for every approach that ship with the package, as paths that `ivl.policy.general.load` takes."""
+    return [f"experiments/{path.name}" for path in sorted(EXPERIMENTS_DIR.glob("*.yaml")) if _is_general(path)]
+
+
+def _is_general(path: Path) -> bool:
+    return path.name.startswith("general")
 
 
 def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experiment:
@@ -202,6 +212,8 @@ def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experi
     """
     file = locate(path, list_experiments())
     data = read_mapping(file)
+    if "tasks" in data:
+        raise ConfigError(f"{file.name}: tasks: an experiment for every approach; learn it with ivl policy learn")
     replace(data, replacements)
     for setting in settings:
         apply_setting(data, setting, Experiment, file.name)

@@ -13,6 +13,7 @@ from functools import wraps
 from typing import Annotated, Any, TypeVar
 
 import typer
+from pydantic import BaseModel
 
 from ivl import experiment, yamlfile
 from ivl.errors import ConfigError
@@ -54,8 +55,11 @@ class Chosen:
     settings: list[str] = field(default_factory=list)
     path: str | None = None
 
-    def fields(self) -> dict[str, Any]:
-        """Fields of the task as raw data: those of the experiment, or the defaults, and what was said.
+    def fields(self, base: BaseModel | None = None) -> dict[str, Any]:
+        """Fields of the task as raw data: those of the experiment, of `base`, or the defaults, and what was said.
+
+        Args:
+            base: What is flown unless an experiment was named; by default the defaults of the task.
 
         Raises:
             ConfigError: The experiment or a setting is wrong, or an option and a setting say the same.
@@ -66,14 +70,14 @@ class Chosen:
                 raise ConfigError(f"--set {setting}: {FLAGS[name][0]} says it, too")
         if self.path is not None:
             return experiment.load(self.path, self.settings).task() | self.given
-        data = {name: default_of(name) for name in ("vehicle", "gear")}
+        data = {n: default_of(n) for n in ("vehicle", "gear")} if base is None else base.model_dump()
         for setting in self.settings:
             apply_setting(data, setting, Task, _LABEL)
         return data | self.given
 
-    def make_world(self) -> World:
-        """The world alone, for commands that are told the approach by somebody else."""
-        data = self.fields()
+    def make_world(self, base: BaseModel | None = None) -> World:
+        """The world alone, for commands that are told the approach by somebody else; `base` as for `fields`."""
+        data = self.fields(base)
         gear = str(data["gear"])
         setup = yamlfile.validate(Setup, {n: v for n, v in data.items() if n in Setup.model_fields}, _LABEL)
         return setup.world_of(gear)
