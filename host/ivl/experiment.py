@@ -5,7 +5,7 @@ path as given, else inside this package), applies settings, and checks everythin
 included.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -199,12 +199,15 @@ def _is_general(path: Path) -> bool:
     return path.name.startswith("general")
 
 
-def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experiment:
+def load(
+    path: str, settings: Sequence[str] = (), change: Callable[[dict[str, Any]], None] | None = None, **replacements: Any
+) -> Experiment:
     """Read, change and check an experiment.
 
     Args:
         path: A file; if it does not exist, the same path inside the package.
         settings: "a.b=value" each: a field of the experiment, or a world parameter such as "sense.latency=0.01".
+        change: Changes the raw data before settings and replacements do.
         **replacements: Fields to replace; None leaves what the file says. `learner` takes a name and drops the options.
 
     Raises:
@@ -214,6 +217,8 @@ def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experi
     data = read_mapping(file)
     if "tasks" in data:
         raise ConfigError(f"{file.name}: tasks: an experiment for every approach; learn it with ivl policy learn")
+    if change is not None:
+        change(data)
     replace(data, replacements)
     for setting in settings:
         apply_setting(data, setting, Experiment, file.name)

@@ -97,6 +97,8 @@ def load(paths: Sequence[str], settings: Sequence[str] = (), **replacements: Any
     files = [locate(path, experiment.list_general()) for path in paths]
     data = read_mapping(files[0])
     label = files[0].name
+    if "tasks" not in data:
+        raise ConfigError(f"{label}: tasks: is missing (an experiment for one approach is for ivl learn)")
     for file in files[1:]:
         more = read_mapping(file)
         if not isinstance(data.get("tasks"), list) or not isinstance(more.get("tasks"), list):

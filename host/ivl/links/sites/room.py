@@ -160,6 +160,7 @@ class Room:
         aborted = vehicle.phase == Phase.ABORTED
         why = vehicle.aborted_by
         check_abort(vehicle)
+        decision = vehicle.decision() if called_off is None else (called_off.p_land, called_off.d_decided_m)
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         recording = vehicle.recording(policy_seq)
         seen_at = self._tracking.resting() if self._tracking is not None else None
@@ -170,6 +171,7 @@ class Room:
         if seen.discard:
             raise RolloutError(f"discarded by the operator{f' (aborted: {why})' if aborted else ''}")
         outcome = outcome_of_flight(recording, vehicle.snapshot(), seen.n_legs, seen.body_contact, resting, self._world)
+        outcome["p_land"], outcome["d_decided_m"] = decision
         if called_off is not None:
             note_no_go(outcome, called_off, self._world)
         return outcome, recording
