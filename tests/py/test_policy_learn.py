@@ -34,6 +34,7 @@ def tiny(**changes: Any) -> dict[str, Any]:
     return {
         "name": "tiny",
         "doc": "Steep approaches.",
+        "form": "polynomial2",
         "tasks": [{**task, "estimator": "known_height_predicted"}],
         "regions": [{"speeds_mps": [2.3, 2.7], "angles_deg": [75.0, 90.0]}],
         "map": {"n_speeds": 2, "n_angles": 2, "n_thresholds": 30, "moments_norm": [0.8], "tau_s": [0.1, 0.4]},
@@ -193,7 +194,7 @@ def test_settings_reach_every_task_and_further_files_add_theirs(tmp_path: Path) 
     assert [task.gear for task in loaded.tasks] == ["wide_long", "wide_long"]
     assert [task.overrides["sense.latency"].value for task in loaded.tasks] == [0.02, 0.02]
     assert (loaded.search.n_select, loaded.seed, loaded.name) == (5, 4, "a")
-    assert general.load(["experiments/general.yaml"]).form == "polynomial2"
+    assert general.load(["experiments/general.yaml"]).form == "polynomial3"
     with pytest.raises(ConfigError, match="learn it with ivl policy learn"):
         experiment.load("experiments/general.yaml")
     with pytest.raises(ConfigError, match="for ivl learn"):

@@ -72,7 +72,7 @@ class GoSettings(Strict):
 class GeneralExperiment(Named):
     """A complete, checked experiment."""
 
-    form: str = Field(default="polynomial2", description="form of the policy; see `ivl list forms`")
+    form: str = Field(default="polynomial3", description="form of the policy; see `ivl list forms`")
     tasks: list[PolicyTask] = Field(min_length=1, description="what is flown; the objective is the mean")
     regions: list[RegionField] = Field(min_length=1, description="box, plane, or limits of speed and angle")
     map: MapSettings = MapSettings()
