@@ -227,7 +227,7 @@ def _check_site(names: Sequence[str], held: Mapping[str, float], found: Sequence
     """The flights give the ceiling of their room; what they have measured cannot be fitted or held otherwise."""
     measured = any(np.isfinite(flip.h_surface_m) for flip in found)
     for option, asked in (("--fit", names), ("--set", held)):
-        if "world.ceiling_height" in asked:
+        if "world.ceiling_height" in asked:  # a recorded number: level ceilings are all that flights were recorded under
             raise ConfigError(f"{option}: world.ceiling_height: the flights give it (h_plane_m)")
         if measured and "world.sensed_gap_offset" in asked:
             raise ConfigError(f"{option}: world.sensed_gap_offset: these flights measured it (h_surface_m)")
@@ -420,11 +420,9 @@ class _Rooms:
         return self._worlds[key]
 
     def hanging_m(self, flip: Flip) -> float:
-        """Height at which the vehicle hangs on four feet in the flight's room."""
+        """Height at which the vehicle hangs on four feet in the flight's room, whose ceiling is level."""
         world = self.world(flip)
-        values = world.params.values
-        down_m = -values["leg.hip_z"] + values["leg.length"] * float(np.cos(np.radians(values["leg.angle"])))
-        return values["world.ceiling_height"] - down_m - values["leg.foot_radius"]
+        return world.surface.point_W_m[2] - world.hanging_gap_m()
 
 
 def _residuals(world: World, flip: Flip, rotor_factor: float) -> dict[str, FloatArray]:
