@@ -227,7 +227,8 @@ def _check_site(names: Sequence[str], held: Mapping[str, float], found: Sequence
     """The flights give the ceiling of their room; what they have measured cannot be fitted or held otherwise."""
     measured = any(np.isfinite(flip.h_surface_m) for flip in found)
     for option, asked in (("--fit", names), ("--set", held)):
-        if "world.ceiling_height" in asked:  # a recorded number: level ceilings are all that flights were recorded under
+        # a recorded number: flights were recorded under level ceilings alone
+        if "world.ceiling_height" in asked:
             raise ConfigError(f"{option}: world.ceiling_height: the flights give it (h_plane_m)")
         if measured and "world.sensed_gap_offset" in asked:
             raise ConfigError(f"{option}: world.sensed_gap_offset: these flights measured it (h_surface_m)")

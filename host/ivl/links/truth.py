@@ -38,7 +38,7 @@ class Resting:
 def suggest_legs(resting: Resting, world: World) -> int:
     """Legs that hold, as far as height and tilt tell: 4, 2 (hangs, but tilted or low), or 0 (not at the ceiling)."""
     gap_m = float(world.surface.gap_m(resting.p_W_m))
-    away = -float(np.dot(resting.up_W, world.surface.normal_W))  # 1: the body's z axis points straight out of the surface
+    away = -float(np.dot(resting.up_W, world.surface.normal_W))  # 1 for a z axis straight out of the surface
     tilt_deg = math.degrees(math.acos(min(max(away, -1.0), 1.0)))
     level = tilt_deg <= _TILT_DEG_MAX and abs(gap_m - world.hanging_gap_m()) <= _GAP_M_MAX
     reach_m = world.derived()["reach_m"] + _GAP_M_MAX
@@ -50,8 +50,8 @@ def outcome_of_flight(
 ) -> np.ndarray[Any, np.dtype[np.void]]:
     """An outcome record, shape (1,), in the library's layout.
 
-    Times count from the recorder's first row; the surface of a room is at rest, so it is where it is at time 0. What a room cannot know (the order of the legs, steps of an integrator)
-    stays 0, and numbers of a contact that was not seen stay NaN.
+    Times count from the recorder's first row. The surface of a room is at rest. What a room cannot know (the order of
+    the legs, steps of an integrator) stays 0, and numbers of a contact that was not seen stay NaN.
     """
     outcome = np.zeros(1, dtype=native.library().outcome_dtype)
     for name in outcome.dtype.names or ():

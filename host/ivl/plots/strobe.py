@@ -1,6 +1,7 @@
 """A landing as a strobe picture: side view of body, legs, propellers and surface at equal time steps.
 
-The view is along the surface, from the surface's own frame: of a level ceiling, x and z of the world. Left the approach and the flip, until touch-down; right the touch-down and the swing, enlarged and with finer steps.
+The view is along the surface, from the surface's own frame: of a level ceiling, x and z of the world. Left the approach
+and the flip, until touch-down; right the touch-down and the swing, enlarged and with finer steps.
 """
 
 from collections.abc import Sequence
@@ -83,7 +84,8 @@ def _draw_panel(
         if first_s <= time_s <= last_s:
             _draw_vehicle(axis, world, _row_at(rows, time_s), color, 2.0)
     path = (rows.t_s >= first_s) & (rows.t_s <= last_s)
-    axis.plot(*_side(world, rows.p_WB_m[path], rows.t_s[path]).T, color=style.GREY, linewidth=0.6, linestyle="--", zorder=0)
+    flown = _side(world, rows.p_WB_m[path], rows.t_s[path])
+    axis.plot(*flown.T, color=style.GREY, linewidth=0.6, linestyle="--", zorder=0)
     axis.axhline(0.0, color="black", linewidth=1.5)
     if not world.surface.is_level:
         _draw_gravity(axis, world)
