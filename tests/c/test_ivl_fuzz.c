@@ -90,7 +90,7 @@ static void random_cfg(flight_t *f)
     cfg->d_source = (uint8_t)((rng_below(&f->rng, 2) == 0u) ? 0u : rng_below(&f->rng, 4));
     cfg->d_predict = (uint8_t)rng_below(&f->rng, 2);
     cfg->of_source = (uint8_t)rng_below(&f->rng, 2);
-    cfg->shape = (uint8_t)rng_below(&f->rng, 3);
+    cfg->shape = (uint8_t)rng_below(&f->rng, 4);
     cfg->d_sigma_norm_max = rng_float(&f->rng, 0.05f, 10.0f);
     cfg->rrev_delay_s = rng_float(&f->rng, 0.0f, 0.03f);
     cfg->accel_delay_s = rng_float(&f->rng, 0.0f, 0.02f);
