@@ -346,6 +346,23 @@ int ivl_sil_policy_accepted(const void *model, int form, const double *theta)
     return (ivl_policy_check(&m->firmware, &policy) == IVL_OK) ? 1 : 0;
 }
 
+void ivl_sil_policy_decide(int form, const double *theta, const double *seen, size_t n, double *actions)
+{
+    const ivl_policy_t policy = ivl_sim_policy(form, theta, false);
+    for (size_t i = 0; i < n; i++)
+    {
+        const double      *in = seen + 3 * i;
+        const ivl_seen_t   this_tick = {.ceiling = {.d_ceil_m = (float)in[0], .valid = true},
+                                        .cues = {.rrev_per_s = (float)in[1], .of_y_radps = (float)in[2], .valid = true}};
+        const ivl_action_t action = ivl_policy_decide(&policy, &this_tick);
+        double            *out = actions + 4 * i;
+        out[0] = action.flip ? 1.0 : 0.0;
+        out[1] = action.go ? 1.0 : 0.0;
+        out[2] = (double)action.moment_Nm;
+        out[3] = (double)action.p_land;
+    }
+}
+
 uint32_t ivl_sil_policy_crc(int form, const double *theta)
 {
     return ivl_sim_policy(form, theta, false).id.crc;

@@ -87,6 +87,10 @@ int ivl_sil_form_group(int number, uint32_t g, ivl_sil_field_t *field, const cha
 /// 1 if a flight core with this model's configuration puts the policy in force, else 0.
 int ivl_sil_policy_accepted(const void *model, int form, const double *theta);
 
+/// What a policy decides of n things that are seen, three numbers each: distance to the ceiling (m), RREV (1/s), OF_y (rad/s).
+/// @param[out] actions  four numbers each: 1 to flip, 1 to go, moment of the flip (N m), probability of a landing
+void ivl_sil_policy_decide(int form, const double *theta, const double *seen, size_t n, double *actions);
+
 /// CRC-32 of a policy, as the vehicle computes it; 0 if there is no such form.
 uint32_t ivl_sil_policy_crc(int form, const double *theta);
 

@@ -171,6 +171,24 @@ class NativeLibrary:
         theta = self.theta(theta_si)
         return int(self._c.ivl_sil_policy_crc(form, _pointer(theta)))
 
+    def decide(
+        self, form: int, theta_si: npt.NDArray[np.float64], seen: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]:
+        """What a policy decides, as the flight core does it.
+
+        Args:
+            form: Number of its form.
+            theta_si: Its parameters in SI units.
+            seen: Distance to the ceiling (m), RREV (1/s) and OF_y (rad/s), shape (n, 3).
+
+        Returns:
+            1 to flip, 1 to go, moment of the flip (N m) and probability of a landing, shape (n, 4).
+        """
+        theta, seen = self.theta(theta_si), np.ascontiguousarray(seen, dtype=np.float64)
+        actions = np.zeros((len(seen), 4))
+        self._c.ivl_sil_policy_decide(form, _pointer(theta), _pointer(seen), len(seen), _pointer(actions))
+        return actions
+
     def theta(self, theta_si: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Parameters with zeros behind them, as many as the library takes."""
         theta = np.zeros(self.spec_fields["theta"].count)
@@ -366,6 +384,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_form", ctypes.c_uint32, (c_int, textp, textp)),
         ("ivl_sil_form_group", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField), textp)),
         ("ivl_sil_policy_accepted", c_int, (ptr, c_int, ptr)),
+        ("ivl_sil_policy_decide", None, (c_int, ptr, ptr, size, ptr)),
         ("ivl_sil_policy_crc", ctypes.c_uint32, (c_int, ptr)),
         ("ivl_sil_hover", c_int, (ptr, ptr, size, ptr, size, double, ptr, size)),
         ("ivl_sil_end_reason", ctypes.c_char_p, (c_int,)),

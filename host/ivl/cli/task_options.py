@@ -14,6 +14,7 @@ from functools import wraps
 from typing import Annotated, Any, TypeVar
 
 import typer
+from pydantic import BaseModel
 
 from ivl import experiment, yamlfile
 from ivl.errors import ConfigError
@@ -57,8 +58,11 @@ class Chosen:
     path: str | None = None
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
-    def fields(self) -> dict[str, Any]:
-        """Fields of the task as raw data: those of the experiment, or the defaults, and what was said.
+    def fields(self, base: BaseModel | None = None) -> dict[str, Any]:
+        """Fields of the task as raw data: those of the experiment, of `base`, or the defaults, and what was said.
+
+        Args:
+            base: What is flown unless an experiment was named; by default the defaults of the task.
 
         Raises:
             ConfigError: The experiment or a setting is wrong, or an option and a setting say the same.
@@ -69,14 +73,18 @@ class Chosen:
                 raise ConfigError(f"--set {setting}: already given by {FLAGS[name][0]}")
         if self.path is not None:
             return experiment.load(self.path, self.settings).task() | self.given
+<<<<<<< HEAD
         data = {name: default_of(name) for name in ("vehicle", "gear")} | dict(self.defaults)
+=======
+        data = {n: default_of(n) for n in ("vehicle", "gear")} if base is None else base.model_dump()
+>>>>>>> policy
         for setting in self.settings:
             apply_setting(data, setting, Task, _LABEL)
         return data | self.given
 
-    def make_world(self) -> World:
-        """The world alone, for commands that are told the approach by somebody else."""
-        data = self.fields()
+    def make_world(self, base: BaseModel | None = None) -> World:
+        """The world alone, for commands that are told the approach by somebody else; `base` as for `fields`."""
+        data = self.fields(base)
         gear = str(data["gear"])
         setup = yamlfile.validate(Setup, {n: v for n, v in data.items() if n in Setup.model_fields}, _LABEL)
         return setup.world_of(gear)

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from ivl import native
+from ivl.links.landing_flight import LevelOut
 from ivl.links.packets import Phase, Recording
 from ivl.links.vehicle import Snapshot
 from ivl.world import World, rotation
@@ -76,6 +77,13 @@ def outcome_of_flight(
         outcome["t_impact_s"] = rows["t_s"][impact]
         outcome["theta_impact_deg"] = pitch_deg(rows["q_WB"])[impact - 1]
     return outcome
+
+
+def note_no_go(outcome: np.ndarray[Any, np.dtype[np.void]], called_off: LevelOut, world: World) -> None:
+    """Write into an outcome of shape (1,) that its approach was called off; the recorder has only the end of it."""
+    outcome["no_go"], outcome["end_reason"] = 1, _end_code("no_go")
+    gap_m = world.params.values["world.ceiling_height"] - called_off.highest_m
+    outcome["d_min_m"] = np.fmin(outcome["d_min_m"], gap_m)
 
 
 def pitch_deg(q_WB: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
