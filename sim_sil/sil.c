@@ -318,19 +318,19 @@ uint32_t ivl_sil_form(int number, const char **name, const char **doc)
     return form->n_params;
 }
 
-int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field, const char **symbol)
+int ivl_sil_form_group(int number, uint32_t g, ivl_sil_field_t *field, const char **symbols)
 {
     const ivl_form_t *form = ivl_form((uint32_t)number);
-    if (form == NULL || i >= form->n_params)
+    if (form == NULL || g >= form->n_groups)
     {
         return -1;
     }
-    const ivl_form_param_t *row = &form->params[i];
-    *symbol = row->symbol;
-    *field = (ivl_sil_field_t){.name = row->name,
+    const ivl_form_group_t *row = &form->groups[g];
+    *symbols = row->symbols;
+    *field = (ivl_sil_field_t){.name = row->names,
                                .type = "f4",
-                               .offset = (uint32_t)(i * sizeof(float)),
-                               .count = 1,
+                               .offset = 0,
+                               .count = row->n,
                                .unit = row->unit,
                                .lo = (double)row->lo,
                                .hi = (double)row->hi,

@@ -79,9 +79,10 @@ int ivl_sil_hover(const void *model, const double *setpoints, size_t n_setpoints
 /// @return number of its parameters; 0 if there is no form with that number
 uint32_t ivl_sil_form(int number, const char **name, const char **doc);
 
-/// A parameter of a form: offset in its array of floats, range in SI; `dflt` is what one `unit` is in SI.
+/// A group of parameters of a form, in the order of its array of floats: names and symbols of `count` parameters with spaces between, range
+/// in SI; `dflt` is what one `unit` is in SI.
 /// @return 0; -1 if there is none
-int ivl_sil_form_param(int number, uint32_t i, ivl_sil_field_t *field, const char **symbol);
+int ivl_sil_form_group(int number, uint32_t g, ivl_sil_field_t *field, const char **symbols);
 
 /// 1 if a flight core with this model's configuration puts the policy in force, else 0.
 int ivl_sil_policy_accepted(const void *model, int form, const double *theta);

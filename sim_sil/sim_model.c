@@ -121,6 +121,18 @@ static bool derive_lowpass(double cutoff_hz, double rate_hz, ivl_sim_lowpass_t *
     return true;
 }
 
+/// Height of the highest part of a level vehicle above its origin.
+static double top_m(const ivl_sim_model_t *model)
+{
+    double top = 0.0;
+    for (int p = 0; p < IVL_SIM_PLATES; p++)
+    {
+        const double plate = model->plate[p].center_z_m + model->plate[p].half_m[2];
+        top = (plate > top) ? plate : top;
+    }
+    return top;
+}
+
 /// The flight core knows the vehicle that it flies: its copy of these numbers follows from the world's.
 static void tell_firmware(ivl_sim_model_t *model)
 {
@@ -135,6 +147,11 @@ static void tell_firmware(ivl_sim_model_t *model)
     cfg->arm_y_m = (float)raw->rotor_y_m;
     cfg->torque_per_thrust_m = (float)raw->rotor_torque_constant_m;
     cfg->motor_thrust_N_max = (float)raw->rotor_thrust_max_N;
+    // the thrust goes with the square of the speed: it falls twice as fast
+    cfg->motor_lag_s = (float)(0.5 * raw->rotor_tau_down_s);
+    // 0 tells that the supply never sags
+    cfg->vbat_V_rated = (raw->battery_voltage_V > 0.0) ? (float)raw->battery_rated_voltage_V : 0.0f;
+    cfg->d_touch_m = (float)(top_m(model) + raw->world_sensed_gap_offset_m);
     cfg->h_ceil_m = (float)(raw->world_ceiling_height_m + raw->world_sensed_gap_offset_m);
 }
 

@@ -29,7 +29,7 @@ WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-prom
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Wvla -Werror
 MACHINE  := -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16
 # enums as wide as on the host: the structs of the core cross the border as they are
-CFLAGS   := -std=c11 $(OPTIMISE_$(FLAVOUR)) $(MACHINE) -ffp-contract=off -fno-math-errno -fno-short-enums \
+CFLAGS   := -std=c11 $(OPTIMISE_$(FLAVOUR)) $(MACHINE) -DIVL_NO_TEXT -ffp-contract=off -fno-math-errno -fno-short-enums \
             -ffunction-sections -fdata-sections -g -Ifirmware/core -Ifirmware/stm32f405
 LDFLAGS  := $(OPTIMISE_$(FLAVOUR)) $(MACHINE) -nostartfiles -static -T firmware/stm32f405/stm32f405.ld -Wl,--gc-sections \
             -Wl,--fatal-warnings -Wl,--no-enum-size-warning -Wl,--no-wchar-size-warning -Wl,-z,noexecstack

@@ -8,7 +8,8 @@
 // an estimator for upright flight is followed only where the vehicle is upright
 static bool follows_estimator(ivl_phase_t phase)
 {
-    return (phase == IVL_PHASE_IDLE) || (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_ABORTED);
+    return (phase == IVL_PHASE_IDLE) || (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_ABORTED) ||
+           (phase == IVL_PHASE_LEVEL_OUT);
 }
 
 // the SDK's state carries no time: an estimator that stands still is seen by a position that does

@@ -9,10 +9,6 @@
 /// attitude alone follows slower than the horizontal loop (3.7 rad/s) asks, and an oblique approach swings; with w_d it settles in a second.
 #include "ivl_controller.h"
 
-// The vertical force asked for never falls below this part of the weight: it keeps the thrust direction defined, the vehicle upright
-// and its roll and pitch under control.
-static const float LIFT_NORM_MIN = 0.2f;
-
 // Far from the reference, where F is limited, F' means little: then this bounds w_d.
 static const float RATE_RADPS_MAX = 10.0f;
 
@@ -27,7 +23,7 @@ static ivl_vec3_t feedback(const ivl_cfg_t *cfg, ivl_vec3_t e, ivl_vec3_t e_rate
 static ivl_vec3_t limited(const ivl_cfg_t *cfg, ivl_vec3_t force_W_N, float tan_tilt_max)
 {
     const float weight_N = cfg->mass_kg * cfg->gravity_mps2;
-    const float lift_N = ivl_clamp(force_W_N.z, LIFT_NORM_MIN * weight_N, 4.0f * cfg->motor_thrust_N_max);
+    const float lift_N = ivl_clamp(force_W_N.z, IVL_LIFT_NORM_MIN * weight_N, 4.0f * cfg->motor_thrust_N_max);
     const float side_N_max = tan_tilt_max * lift_N;
     const float side_N = sqrtf(force_W_N.x * force_W_N.x + force_W_N.y * force_W_N.y);
     const float keep = (side_N > side_N_max) ? side_N_max / side_N : 1.0f;

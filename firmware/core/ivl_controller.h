@@ -5,6 +5,10 @@
 #include "ivl_approach.h"
 #include "ivl_math.h"
 
+/// The vertical force asked for never falls below this part of the weight: it keeps the thrust direction defined, the vehicle upright
+/// and its roll and pitch under control.
+static const float IVL_LIFT_NORM_MIN = 0.2f;
+
 /// Total thrust along b_z and moment in B.
 typedef struct
 {

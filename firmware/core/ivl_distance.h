@@ -33,6 +33,12 @@ typedef struct
     uint32_t      n_gated_run;
 } ivl_distance_t;
 
+/// True if the distance is that of the present tick, false if it is that of the last sample.
+static inline bool ivl_distance_is_present(const ivl_cfg_t *cfg)
+{
+    return (cfg->d_source != (uint8_t)IVL_SOURCE_HEIGHT) || (cfg->d_predict != 0u);
+}
+
 /// One tick.  At most one measurement is taken in a tick; another one that waits is taken in the next.
 /// @param[in] is_approach  false: an estimate ends, and the next approach begins anew
 /// @return .valid only if the distance is in [d_ceil_m_min, d_ceil_m_max], its standard deviation within d_sigma_norm_max of it, and a

@@ -10,37 +10,61 @@
 typedef struct
 {
     bool  flip;       ///< flip now
-    bool  go;         ///< false: a flip from here would not land, so none starts
+    bool  go;         ///< false: the landing is too unlikely, so no flip is to start
     float moment_Nm;  ///< magnitude of the nose-up moment of the flip, >= 0
+    float p_land;     ///< estimated probability that this approach ends in a landing; 1 if the form makes no estimate
 } ivl_action_t;
 
-/// One parameter of a form.  Ranges and theta are in SI units; people see a value in `unit`, which is `per_unit` in SI.
+/// A run of parameters of one kind.  Ranges and theta are in SI units; people see a value in `unit`, which is `per_unit` in SI.
+/// The vehicle needs the ranges only: IVL_NO_TEXT leaves the words out.
 typedef struct
 {
-    const char *name;      ///< with its unit, for files and tables, for example "moment_y_Nmm"
-    const char *symbol;    ///< for people, for example "M_yd"
-    const char *unit;      ///< that people use
+    uint8_t n;       ///< how many
+    float   lo, hi;  ///< allowed range of each, SI
+#ifndef IVL_NO_TEXT
     float       per_unit;  ///< 1 unit in SI
-    float       lo, hi;    ///< allowed range, SI
+    const char *names;     ///< n of them with their unit, for files and tables, a space between: "m_0_Nmm m_x_Nmm"
+    const char *symbols;   ///< n of them, for people: "M_0 M_x"
+    const char *unit;      ///< that people use
     const char *doc;
-} ivl_form_param_t;
+#endif
+} ivl_form_group_t;
+
+#ifdef IVL_NO_TEXT
+#define IVL_FORM_TEXT(per_unit_, unit_, names_, symbols_, doc_)
+#else
+#define IVL_FORM_TEXT(per_unit_, unit_, names_, symbols_, doc_)                                                                            \
+    .per_unit = (per_unit_), .unit = (unit_), .names = (names_), .symbols = (symbols_), .doc = (doc_)
+#endif
 
 typedef struct
 {
-    const char             *name;
-    const char             *doc;
-    const ivl_form_param_t *params;
-    uint8_t                 n_params;  ///< 1..IVL_FORM_PARAMS_MAX
+    const char *name;
+#ifndef IVL_NO_TEXT
+    const char *doc;
+#endif
+    const ivl_form_group_t *groups;  ///< in the order of theta
+    uint8_t                 n_groups;
+    uint8_t                 n_params;  ///< of all groups, 1..IVL_FORM_PARAMS_MAX
     /// Asked once a tick of an approach, with valid cues and a ceiling that comes closer.  Pure.
     ivl_action_t (*decide)(const float theta[], const ivl_seen_t *seen);
     /// Largest moment that these parameters can ask for, whatever is seen, N m.
     float (*moment_most_Nm)(const float theta[]);
 } ivl_form_t;
 
+#ifdef IVL_NO_TEXT
+#define IVL_FORM_DOC(doc_)
+#else
+#define IVL_FORM_DOC(doc_) .doc = (doc_),
+#endif
+
 // clang-format off
 /// The forms; a form's number is its place here.
 #define IVL_FORMS_BUILT_IN(X) \
-    X(constant)
+    X(constant)             \
+    X(polynomial2)          \
+    X(polynomial3)          \
+    X(bilinear)
 // clang-format on
 
 /// Forms of one's own stand in a folder that `make FORMS=folder` names: sources, and forms.h with IVL_FORMS_OWN(X).
@@ -56,4 +80,8 @@ IVL_FORMS(IVL_FORM_DECLARE)
 
 /// A form by its number, NULL if there is none with that number.
 const ivl_form_t *ivl_form(uint32_t number);
+
+/// The group of a form's parameter.
+/// @return NULL if the form has no parameter i
+const ivl_form_group_t *ivl_form_group_of(const ivl_form_t *form, uint32_t i);
 #endif  // IVL_FORM_H

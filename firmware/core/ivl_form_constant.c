@@ -9,16 +9,17 @@ enum
     N_PARAMS
 };
 
-static const ivl_form_param_t PARAMS[] = {
-    [RREV_C] = {"rrev_c_per_s", "RREV_c", "1/s", 1.0f, 0.0f, 20.0f,
-                "RREV at which the flip starts; 0: the first tick that sees the ceiling close"},
-    [MOMENT] = {"moment_y_Nmm", "M_yd", "N mm", 1.0e-3f, 0.0f, 0.02f, "nose-up moment of the front motors"},
+static const ivl_form_group_t GROUPS[] = {
+    [RREV_C] = {1, 0.0f, 20.0f,
+                IVL_FORM_TEXT(1.0f, "1/s", "rrev_c_per_s", "RREV_c",
+                              "RREV at which the flip starts; 0: the first tick that sees the ceiling close")},
+    [MOMENT] = {1, 0.0f, 0.02f, IVL_FORM_TEXT(1.0e-3f, "N mm", "moment_y_Nmm", "M_yd", "nose-up moment of the front motors")},
 };
-_Static_assert(sizeof PARAMS / sizeof PARAMS[0] == N_PARAMS, "one row a parameter");
+_Static_assert(sizeof GROUPS / sizeof GROUPS[0] == N_PARAMS, "one row a parameter");
 
 static ivl_action_t decide(const float theta[], const ivl_seen_t *seen)
 {
-    return (ivl_action_t){.flip = seen->cues.rrev_per_s >= theta[RREV_C], .go = true, .moment_Nm = theta[MOMENT]};
+    return (ivl_action_t){.flip = seen->cues.rrev_per_s >= theta[RREV_C], .go = true, .moment_Nm = theta[MOMENT], .p_land = 1.0f};
 }
 
 static float moment_most_Nm(const float theta[])
@@ -28,8 +29,8 @@ static float moment_most_Nm(const float theta[])
 
 const ivl_form_t ivl_form_constant = {
     .name = "constant",
-    .doc = "a threshold of RREV and a moment, both constant over an approach",
-    .params = PARAMS,
+    IVL_FORM_DOC("a threshold of RREV and a moment, both constant over an approach").groups = GROUPS,
+    .n_groups = N_PARAMS,
     .n_params = N_PARAMS,
     .decide = decide,
     .moment_most_Nm = moment_most_Nm,

@@ -2,6 +2,7 @@
 /// The rules.  Read the table first; docs/SAFETY.md says on which property of the vehicle each row rests.
 #include "ivl_guard.h"
 
+#include "ivl_level_out.h"
 #include "ivl_math.h"
 
 // ---- conditions: pure questions about this tick.  Written in positive form and negated, so that a NaN counts as the bad case.
@@ -127,6 +128,12 @@ CONDITION(approach_too_long)
     return elapsed(state, cfg->approach_s_max);
 }
 
+CONDITION(level_out_too_long)
+{
+    UNUSED(seen);
+    return elapsed(state, cfg->level_out_s_max);
+}
+
 CONDITION(contact)
 {
     UNUSED(seen);
@@ -195,6 +202,11 @@ CONDITION(cue_invalid)
     return !seen->cues.valid;
 }
 
+CONDITION(would_not_land)
+{
+    return !state->action.go && ivl_level_out_asked(cfg, state, seen);
+}
+
 // ---- the table: the first row that holds counts
 
 #define IDLE     (1u << IVL_PHASE_IDLE)
@@ -203,7 +215,8 @@ CONDITION(cue_invalid)
 #define FLIP     (1u << IVL_PHASE_FLIP)
 #define COAST    (1u << IVL_PHASE_COAST)
 #define ABORTED  (1u << IVL_PHASE_ABORTED)
-#define BEFORE   (IDLE | READY | APPROACH)
+#define LEVEL    (1u << IVL_PHASE_LEVEL_OUT)
+#define BEFORE   (IDLE | READY | APPROACH | LEVEL)
 
 // what a flight that this rule ended says about its policy: nothing, so that it is discarded, or what its outcome says
 #define DISCARDS true
@@ -232,6 +245,7 @@ CONDITION(cue_invalid)
     X(with, UNCERTAIN,     "uncertain",     BEFORE,        position_uncertain, ABORT,  DISCARDS)  \
     X(with, TOO_CLOSE,     "too_close",     APPROACH,      too_close,          ABORT,  SCORED)    \
     X(with, APPROACH_TIME, "approach_time", APPROACH,      approach_too_long,  ABORT,  SCORED)    \
+    X(with, LEVEL_OUT_TIME, "level_out_time", LEVEL,       level_out_too_long, ABORT,  SCORED)    \
     /* after the trigger: nothing but contact, loss of all senses and the clock ends a flip */    \
     X(with, CONTACT,       "contact",       FLIP | COAST,  contact,            ATTACH, SCORED)    \
     X(with, HANG,          "hang",          FLIP | COAST,  hanging,            ATTACH, SCORED)    \
@@ -245,7 +259,9 @@ CONDITION(cue_invalid)
     X(with, NO_POLICY,     "no_policy",     APPROACH,      no_policy,          HOLD,   DISCARDS)  \
     X(with, ONE_SHOT,      "one_shot",      APPROACH,      has_triggered,      HOLD,   SCORED)    \
     X(with, NOT_FRESH,     "not_fresh",     APPROACH,      not_this_tick,      HOLD,   SCORED)    \
-    X(with, CUE,           "cue",           APPROACH,      cue_invalid,        HOLD,   SCORED)
+    X(with, CUE,           "cue",           APPROACH,      cue_invalid,        HOLD,   SCORED)    \
+    /* the policy expects no landing, and it is the last moment to call it off */                 \
+    X(with, NO_GO,         "no_go",         APPROACH,      would_not_land,     LEVEL,  SCORED)
 // clang-format on
 
 typedef struct
@@ -267,10 +283,11 @@ _Static_assert(IVL_RULE_COUNT <= 255, "a rule is logged in one byte");
 #define OR_FIRST(with, id, name, phases, when, act, discards) (((phases) & (with)) != 0u) ? (uint8_t)IVL_RULE_##id:
 #define FIRST_OF(phase)                                       (RULES(OR_FIRST, 1u << (phase))(uint8_t) IVL_RULE_COUNT)
 static const uint8_t FIRST[] = {
-    [IVL_PHASE_IDLE] = FIRST_OF(IVL_PHASE_IDLE),         [IVL_PHASE_READY] = FIRST_OF(IVL_PHASE_READY),
-    [IVL_PHASE_APPROACH] = FIRST_OF(IVL_PHASE_APPROACH), [IVL_PHASE_FLIP] = FIRST_OF(IVL_PHASE_FLIP),
-    [IVL_PHASE_COAST] = FIRST_OF(IVL_PHASE_COAST),       [IVL_PHASE_ATTACHED] = FIRST_OF(IVL_PHASE_ATTACHED),
-    [IVL_PHASE_DONE] = FIRST_OF(IVL_PHASE_DONE),         [IVL_PHASE_ABORTED] = FIRST_OF(IVL_PHASE_ABORTED),
+    [IVL_PHASE_IDLE] = FIRST_OF(IVL_PHASE_IDLE),           [IVL_PHASE_READY] = FIRST_OF(IVL_PHASE_READY),
+    [IVL_PHASE_APPROACH] = FIRST_OF(IVL_PHASE_APPROACH),   [IVL_PHASE_FLIP] = FIRST_OF(IVL_PHASE_FLIP),
+    [IVL_PHASE_COAST] = FIRST_OF(IVL_PHASE_COAST),         [IVL_PHASE_ATTACHED] = FIRST_OF(IVL_PHASE_ATTACHED),
+    [IVL_PHASE_DONE] = FIRST_OF(IVL_PHASE_DONE),           [IVL_PHASE_ABORTED] = FIRST_OF(IVL_PHASE_ABORTED),
+    [IVL_PHASE_LEVEL_OUT] = FIRST_OF(IVL_PHASE_LEVEL_OUT),
 };
 _Static_assert(sizeof FIRST / sizeof FIRST[0] == (size_t)IVL_PHASE_COUNT, "one entry a phase");
 

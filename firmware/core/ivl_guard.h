@@ -14,7 +14,8 @@ typedef enum
     IVL_ACT_ABORT,   ///< level hover, then landing
     IVL_ACT_ATTACH,  ///< motors off: contact or hanging was sensed
     IVL_ACT_CUT,     ///< motors off
-    IVL_ACT_HOLD     ///< the trigger does not fire in this tick
+    IVL_ACT_HOLD,    ///< the trigger does not fire in this tick
+    IVL_ACT_LEVEL    ///< no-go: keep off the ceiling, then hover
 } ivl_act_t;
 
 /// First rule of the table that holds in the present phase, IVL_RULE_NONE if none does.  O(rules), no side effect.

@@ -1,5 +1,5 @@
 /// @file ivl_math.c
-/// The polynomials are minimax fits of this project on [0, (pi/4)^2] in z = x^2, rounded to single precision.
+/// The polynomials are minimax fits of this project, rounded to single precision; those of sine, cosine and tangent on [0, (pi/4)^2] in z = x^2.
 #include "ivl_math.h"
 
 // pi/2 in three parts; the first two have so few bits that small integer multiples of them are exact
@@ -67,4 +67,40 @@ float ivl_tan(float x_rad)
     // tan x = 1 / tan(pi/2 - x); the first difference is exact
     const float t = 1.0f / tan_poly((HALF_PI_1 - x_abs) + (HALF_PI_2 + HALF_PI_3));
     return (x < 0.0f) ? -t : t;
+}
+
+static const float LOGISTIC_MAX = 30.0f;
+static const float LOG2_E = 1.44269504f;
+// ln 2 in two parts; the first has so few bits that small integer multiples of it are exact
+static const float LN_2_1 = 0.693359375f;
+static const float LN_2_2 = -2.12194440e-4f;
+
+// exp x on [-ln(2) / 2, ln(2) / 2]
+static float exp_poly(float x)
+{
+    return 1.0f + x + x * x * (0.49999148f + x * (0.16666457f + x * (4.1898277e-2f + x * 8.37464e-3f)));
+}
+
+// 2^n for n in -60..0: halving is exact
+static float power_of_half(int n)
+{
+    float power = 1.0f, half = 0.5f;
+    for (unsigned k = (unsigned)(-n); k != 0u; k >>= 1u)
+    {
+        power = ((k & 1u) != 0u) ? power * half : power;
+        half = half * half;
+    }
+    return power;
+}
+
+float ivl_logistic(float x)
+{
+    const float s = ivl_clamp(x, -LOGISTIC_MAX, LOGISTIC_MAX);
+    // exp of a number that is not positive, so that nothing overflows
+    const float a = -fabsf(s);
+    const int   n = (int)(a * LOG2_E - 0.5f);
+    const float k = (float)n;
+    const float e = exp_poly((a - k * LN_2_1) - k * LN_2_2) * power_of_half(n);
+    const float low = e / (1.0f + e);
+    return (s < 0.0f) ? low : 1.0f - low;
 }

@@ -88,4 +88,7 @@ ivl_sincos_t ivl_sincos(float x_rad);
 
 /// Tangent, relative error below 4e-7 for |x| <= 1.5 rad; the argument is limited to that range (NaN: the lower end).
 float ivl_tan(float x_rad);
+
+/// Logistic function 1 / (1 + exp(-x)), absolute error below 2e-7; NaN gives 0.
+float ivl_logistic(float x);
 #endif  // IVL_MATH_H

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "ivl_guard.h"
+#include "ivl_level_out.h"
 
 // ---- conditions: pure questions about the state of this tick
 
@@ -85,7 +86,20 @@ CONDITION(must_cut)
     return rule_says(state, IVL_ACT_CUT);
 }
 
+CONDITION(must_level_out)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return rule_says(state, IVL_ACT_LEVEL);
+}
+
 // ---- conditions: the landing
+
+// a vehicle that still rises towards the ceiling is not to be steered anywhere
+CONDITION(hover_after_rise)
+{
+    UNUSED(cfg), UNUSED(seen);
+    return requested(state, IVL_REQUEST_HOVER) && !state->level.rises;
+}
 
 CONDITION(triggered)
 {
@@ -107,7 +121,7 @@ CONDITION(attached_over)
 
 // ---- the table
 
-#define EXITS_MAX 5
+#define EXITS_MAX 6
 
 typedef struct
 {
@@ -137,6 +151,7 @@ static const row_t ROWS[] = {
          {request_abort,     IVL_PHASE_ABORTED},
          {must_abort,        IVL_PHASE_ABORTED},
          {request_hover,     IVL_PHASE_READY},
+         {must_level_out,    IVL_PHASE_LEVEL_OUT},
          {triggered,         IVL_PHASE_FLIP}}},
     [IVL_PHASE_FLIP] = {"flip", IVL_DRIVE_FLIP,
         {{request_idle,      IVL_PHASE_IDLE},
@@ -154,6 +169,11 @@ static const row_t ROWS[] = {
         {{request_idle,      IVL_PHASE_IDLE}}},
     [IVL_PHASE_ABORTED] = {"aborted", IVL_DRIVE_LAND,
         {{request_idle,      IVL_PHASE_IDLE}}},
+    [IVL_PHASE_LEVEL_OUT] = {"level_out", IVL_DRIVE_LEVEL,
+        {{request_idle,      IVL_PHASE_IDLE},
+         {request_abort,     IVL_PHASE_ABORTED},
+         {must_abort,        IVL_PHASE_ABORTED},
+         {hover_after_rise,  IVL_PHASE_READY}}},
 };
 // clang-format on
 
@@ -161,6 +181,7 @@ static const row_t ROWS[] = {
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_PHASE_COUNT, "one row a phase");
 _Static_assert(IVL_PHASE_IDLE == 0 && IVL_PHASE_READY == 1 && IVL_PHASE_APPROACH == 2 && IVL_PHASE_FLIP == 3, "phase numbers");
 _Static_assert(IVL_PHASE_COAST == 4 && IVL_PHASE_ATTACHED == 5 && IVL_PHASE_DONE == 6 && IVL_PHASE_ABORTED == 7, "phase numbers");
+_Static_assert(IVL_PHASE_LEVEL_OUT == 8, "phase numbers");
 
 // ---- what happens on the way into a phase
 
@@ -170,6 +191,15 @@ static void enter_ready(ivl_state_t *state)
     state->guard.cause = IVL_RULE_NONE;
     memset(&state->snapshot, 0, sizeof state->snapshot);
     memset(&state->action, 0, sizeof state->action);
+    memset(&state->decision, 0, sizeof state->decision);
+}
+
+static void begin_approach(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
+{
+    const ivl_sense_t *sense = &state->sense;
+    const ivl_room_t   room = ivl_state_room(state, seen);
+    ivl_approach_begin(cfg, &state->approach, &room, sense->sample.p_WB_m, sense->sample.v_WB_mps, sense->cmd.speed_mps,
+                       sense->cmd.angle_rad);
 }
 
 static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, const ivl_seen_t *seen)
@@ -184,7 +214,8 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
         state->p_hold_W_m = sample->p_WB_m;
         break;
     case IVL_PHASE_APPROACH:
-        ivl_approach_begin(cfg, &state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
+        memset(&state->decision, 0, sizeof state->decision);
+        begin_approach(cfg, state, seen);
         break;
     case IVL_PHASE_FLIP:
         state->triggered = true;
@@ -196,6 +227,10 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
         state->abort_cut = false;
         state->landed_s = 0.0f;
         state->diag.n_abort++;
+        break;
+    case IVL_PHASE_LEVEL_OUT:
+        ivl_level_out_begin(state);
+        state->diag.n_no_go++;
         break;
     case IVL_PHASE_IDLE:
     case IVL_PHASE_COAST:
@@ -209,9 +244,25 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
 
 static void note_cause(ivl_state_t *state)
 {
-    if (rule_says(state, IVL_ACT_ABORT) || rule_says(state, IVL_ACT_ATTACH) || rule_says(state, IVL_ACT_CUT))
+    if (rule_says(state, IVL_ACT_ABORT) || rule_says(state, IVL_ACT_ATTACH) || rule_says(state, IVL_ACT_CUT) ||
+        rule_says(state, IVL_ACT_LEVEL))
     {
         state->guard.cause = state->guard.rule;
+    }
+}
+
+// go or no-go is decided once: after a go at the last moment there is no way back, so the flip is no longer asked about
+static void decide_once(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
+{
+    const bool may = (state->phase == IVL_PHASE_APPROACH) && (rule_says(state, IVL_ACT_NONE) || rule_says(state, IVL_ACT_LEVEL));
+    if (may && ivl_level_out_asked(cfg, state, seen))
+    {
+        state->decision = (ivl_decision_t){
+            .made = true,
+            .go = state->action.go,
+            .p_land = state->action.p_land,
+            .d_ceil_m = seen->ceiling.d_ceil_m,
+        };
     }
 }
 
@@ -222,6 +273,7 @@ static bool take_exit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t
         state->action = ivl_policy_decide(&state->policy, seen);
     }
     state->guard.rule = (uint8_t)ivl_guard_find(cfg, state, seen);
+    decide_once(cfg, state, seen);
     for (const exit_t *e = ROWS[state->phase].exits; e->when != NULL; e++)
     {
         if (e->when(cfg, state, seen))

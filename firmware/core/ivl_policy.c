@@ -38,11 +38,15 @@ ivl_status_t ivl_policy_check(const ivl_cfg_t *cfg, const ivl_policy_t *policy)
     {
         return IVL_ERR_FORM;
     }
-    bool good = true;
-    for (uint32_t i = 0; i < policy->n; i++)
+    bool         good = true;
+    const float *theta = policy->theta;
+    for (uint32_t g = 0; g < form->n_groups; g++)
     {
-        // positive form, so that NaN is refused
-        good = good && (policy->theta[i] >= form->params[i].lo) && (policy->theta[i] <= form->params[i].hi);
+        for (uint32_t i = 0; i < form->groups[g].n; i++, theta++)
+        {
+            // positive form, so that NaN is refused
+            good = good && (*theta >= form->groups[g].lo) && (*theta <= form->groups[g].hi);
+        }
     }
     return (good && (form->moment_most_Nm(policy->theta) <= cfg->flip_moment_Nm_max)) ? IVL_OK : IVL_ERR_RANGE;
 }
@@ -54,7 +58,8 @@ ivl_action_t ivl_policy_decide(const ivl_policy_t *policy, const ivl_seen_t *see
     if ((form != NULL) && seen->cues.valid && (seen->cues.rrev_per_s > 0.0f))
     {
         action = form->decide(policy->theta, seen);
-        action.flip = (action.flip || policy->at_once) && action.go;
+        action.flip = action.flip || policy->at_once;
+        action.go = action.go || policy->at_once;
     }
     return action;
 }

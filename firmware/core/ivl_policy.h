@@ -29,5 +29,6 @@ uint32_t ivl_policy_crc(const ivl_policy_t *policy);
 ivl_status_t ivl_policy_check(const ivl_cfg_t *cfg, const ivl_policy_t *policy);
 
 /// What a policy decides from what is seen.  Without a valid cue, or while the ceiling does not come closer, it decides nothing: no flip.
+/// A flip that is not to go is left to the rule no_go, which calls the approach off.
 ivl_action_t ivl_policy_decide(const ivl_policy_t *policy, const ivl_seen_t *seen);
 #endif  // IVL_POLICY_H

@@ -16,6 +16,7 @@ typedef struct
     uint32_t n_policy_refused;  ///< policies refused: form, range or phase
     uint32_t n_abort;           ///< entries into ABORTED
     uint32_t n_trigger;         ///< triggers fired
+    uint32_t n_no_go;           ///< approaches called off
 } ivl_diag_t;
 
 /// What the safety rules remember.
@@ -37,6 +38,25 @@ typedef struct
     bool  cfg_good;  ///< false: ivl_cfg_check refused the configuration, the core stays in IDLE
 } ivl_derived_t;
 
+/// What was decided about this approach, go or no-go.  All zero before.
+typedef struct
+{
+    bool  made;      ///< it was decided
+    bool  go;        ///< the flip may start
+    float p_land;    ///< probability of a landing that decided it
+    float d_ceil_m;  ///< distance at which it was decided
+} ivl_decision_t;
+
+/// What LEVEL_OUT remembers.
+typedef struct
+{
+    bool       rises;      ///< still on the way up
+    float      z_W_m;      ///< height at which to hover in the end
+    float      rest_s;     ///< how long the reference has been at rest there
+    float      speed_mps;  ///< speed of the reference along the ceiling, once the vehicle rises no more
+    ivl_vec3_t dir_W;      ///< its direction, unit length
+} ivl_level_t;
+
 typedef struct
 {
     ivl_phase_t    phase;
@@ -48,8 +68,10 @@ typedef struct
     ivl_sense_t    sense;
     ivl_policy_t   policy;
     ivl_action_t   action;  ///< what the policy decided in the last tick of an approach
+    ivl_decision_t decision;
     ivl_approach_t approach;
-    ivl_vec3_t     p_hold_W_m;  ///< where READY and ABORTED hover
+    ivl_level_t    level;
+    ivl_vec3_t     p_hold_W_m;  ///< where READY, ABORTED and LEVEL_OUT hover
     float          landed_s;    ///< ABORTED: how long the reference has been at land_height
     ivl_guard_t    guard;
     ivl_contact_t  contact;
@@ -57,4 +79,14 @@ typedef struct
     ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
     ivl_diag_t     diag;
 } ivl_state_t;
+
+/// What is left for an approach, as this tick knows it.
+static inline ivl_room_t ivl_state_room(const ivl_state_t *state, const ivl_seen_t *seen)
+{
+    const ivl_vitals_t *vitals = &state->guard.vitals;
+    return (ivl_room_t){
+        .d_ceil_m = seen->ceiling.valid ? seen->ceiling.d_ceil_m : 0.0f,
+        .vbat_V = (vitals->given != 0u) ? vitals->vbat_V : 0.0f,
+    };
+}
 #endif  // IVL_STATE_H

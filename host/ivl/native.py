@@ -9,8 +9,8 @@ import hashlib
 import itertools
 import os
 import weakref
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -150,14 +150,21 @@ class NativeLibrary:
         """Forms by number: name, description, parameters with symbol (range in SI; `default`: one unit in SI)."""
         found: list[tuple[str, str, tuple[tuple[str, Field], ...]]] = []
         name, doc = ctypes.c_char_p(), ctypes.c_char_p()
-        while n := self._c.ivl_sil_form(len(found), ctypes.byref(name), ctypes.byref(doc)):
-            found.append((_text(name), _text(doc), tuple(self._form_parameter(len(found), i) for i in range(n))))
+        while self._c.ivl_sil_form(len(found), ctypes.byref(name), ctypes.byref(doc)):
+            found.append((_text(name), _text(doc), tuple(self._form_parameters(len(found)))))
         return found
 
-    def _form_parameter(self, number: int, i: int) -> tuple[str, Field]:
-        row, symbol = _CField(), ctypes.c_char_p()
-        self._c.ivl_sil_form_param(number, i, ctypes.byref(row), ctypes.byref(symbol))
-        return _text(symbol), _field(row)
+    def _form_parameters(self, number: int) -> Iterator[tuple[str, Field]]:
+        row, symbols = _CField(), ctypes.c_char_p()
+        for g in itertools.count():
+            if self._c.ivl_sil_form_group(number, g, ctypes.byref(row), ctypes.byref(symbols)):
+                return
+            group = _field(row)
+            names, letters = group.name.split(" "), _text(symbols).split(" ")
+            if not len(names) == len(letters) == group.count:
+                raise NativeError(f"{self.path}: policy form {number}: {group.count} parameters are not named {names}")
+            for name, symbol in zip(names, letters, strict=True):
+                yield symbol, replace(group, name=name, count=1)
 
     def policy_crc(self, form: int, theta_si: npt.NDArray[np.float64]) -> int:
         """Checksum of a policy: number of its form, and its parameters in SI units."""
@@ -357,7 +364,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_replay", c_int, (ptr, ptr, c_int, ptr, ptr, size, ptr)),
         ("ivl_sil_form", ctypes.c_uint32, (c_int, textp, textp)),
-        ("ivl_sil_form_param", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField), textp)),
+        ("ivl_sil_form_group", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField), textp)),
         ("ivl_sil_policy_accepted", c_int, (ptr, c_int, ptr)),
         ("ivl_sil_policy_crc", ctypes.c_uint32, (c_int, ptr)),
         ("ivl_sil_hover", c_int, (ptr, ptr, size, ptr, size, double, ptr, size)),

@@ -311,9 +311,9 @@ static void commit_another(recorder_t *r, int lane, ivl_state_t *state)
     policy.at_once = false;
     for (uint32_t i = 0; i < policy.n; i++)
     {
-        const ivl_form_param_t *param = &ivl_form(policy.id.form)->params[i];
-        const float             beyond = 0.07f * (param->hi - param->lo);
-        policy.theta[i] = between(r, param->lo - beyond, param->hi + beyond);
+        const ivl_form_group_t *group = ivl_form_group_of(ivl_form(policy.id.form), i);
+        const float             beyond = 0.07f * (group->hi - group->lo);
+        policy.theta[i] = between(r, group->lo - beyond, group->hi + beyond);
     }
     if (chance(r, 0.2))
     {

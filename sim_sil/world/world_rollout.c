@@ -1,10 +1,12 @@
 #include "world_rollout.h"
 
+#include "ivl_level_out.h"
 #include "phys_energy.h"
 #include "phys_plates.h"
 #include "world_step_size.h"
 
-static const char *const END_NAMES[] = {"contact_time", "missed", "missed_time", "time_max", "refused", "not_finite", "step_limit"};
+static const char *const END_NAMES[] = {"contact_time", "missed",     "missed_time", "time_max",
+                                        "refused",      "not_finite", "step_limit",  "no_go"};
 _Static_assert(sizeof END_NAMES / sizeof END_NAMES[0] == IVL_SIM_END_COUNT, "a name for each end");
 
 static const double QUATERNION_SLACK = 1.0e-3;  // of the squared length of a stated attitude
@@ -18,10 +20,11 @@ const char *ivl_sim_end_name(int end)
 static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, double sin_angle)
 {
     const double speed = spec->speed_mps[0];
+    const double path = 0.5 * speed * speed / (double)model->firmware.approach_accel_mps2 + speed * model->raw.start_hold_time_s;
     switch ((ivl_sim_start_t)spec->start[0])
     {
     case IVL_SIM_START_FLOWN:
-        return sin_angle * (0.5 * speed * speed / (double)model->firmware.approach_accel_mps2 + speed * model->raw.start_hold_time_s);
+        return (sin_angle * path > model->raw.start_room_m) ? sin_angle * path : model->raw.start_room_m;
     case IVL_SIM_START_AT_TRIGGER:
         return spec->d_ceil_m[0];
     case IVL_SIM_START_IMPARTED:
@@ -151,7 +154,7 @@ void ivl_sim_outcome_clear(ivl_sim_outcome_t *o)
     double *const fields[] = {o->t_trigger_s,       o->t_impact_s,         o->t_end_s,       o->theta_impact_deg, o->vx_trigger_mps,
                               o->vz_trigger_mps,    o->rate_trigger_radps, o->vx_impact_mps, o->vz_impact_mps,    o->rate_impact_radps,
                               o->d_trigger_m,       o->rrev_trigger,       o->of_y_trigger,  o->d_min_m,          o->d_true_trigger_m,
-                              o->d_sigma_trigger_m, o->d_valid_norm};
+                              o->d_sigma_trigger_m, o->d_valid_norm,       o->p_land,        o->d_decided_m};
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++)
     {
         fields[i][0] = (double)NAN;
@@ -194,6 +197,13 @@ static void note_end(const ivl_sim_world_t *world, ivl_sim_end_t end, ivl_sim_ou
     o->body_contact[0] = world->plate_touched[IVL_SIM_PROP_PLATE] ? 1 : 0;
     o->base_contact[0] = world->plate_touched[IVL_SIM_BASE_PLATE] ? 1 : 0;
     o->d_min_m[0] = world->d_min_m;
+    const ivl_decision_t *decision = &world->firmware.decision;
+    if (decision->made)
+    {
+        o->no_go[0] = decision->go ? 0 : 1;
+        o->p_land[0] = (double)decision->p_land;
+        o->d_decided_m[0] = (double)decision->d_ceil_m;
+    }
     o->n_steps[0] = world->n_step;
     o->n_ticks[0] = world->n_tick;
     if (world->n_approach_tick > 0)
@@ -231,6 +241,9 @@ static bool out_of_reach(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin,
     return ivl_sim_surface_height_of(surface, ivl_d3_load(kin->p_WB_m)) + rise + reach < surface_height_m;
 }
 
+// a level-out is over once the vehicle was to hover for this long
+static const double HOVER_S = 0.5;
+
 static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_t *o, ivl_sim_end_t *end)
 {
     const ivl_sim_world_t  *world = &group->world[lane];
@@ -259,6 +272,11 @@ static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_
     if (o->triggered[0] && world->t_s >= o->t_trigger_s[0] + raw->end_missed_time_s - slack)
     {
         *end = IVL_SIM_END_MISSED_TIME;
+        return true;
+    }
+    *end = IVL_SIM_END_NO_GO;
+    if (world->firmware.phase == IVL_PHASE_LEVEL_OUT && (double)world->firmware.level.rest_s >= HOVER_S)
+    {
         return true;
     }
     *end = IVL_SIM_END_MISSED;

@@ -23,6 +23,7 @@ typedef enum
     IVL_SIM_END_REFUSED,       ///< the flight core refused the policy
     IVL_SIM_END_NOT_FINITE,    ///< the state ceased to be finite: a defect, or absurd parameters
     IVL_SIM_END_STEP_LIMIT,    ///< the motion took more work than any landing needs: a defect, or absurd parameters
+    IVL_SIM_END_NO_GO,         ///< the policy called the approach off, and the vehicle hovers
     IVL_SIM_END_COUNT
 } ivl_sim_end_t;
 
@@ -53,6 +54,7 @@ typedef enum
     X(int32_t, base_contact, 1, "i4", "1", 0, 1, 0, "1 if the base plate touched the ceiling") \
     X(int32_t, end_reason, 1, "i4", "1", 0, IVL_SIM_END_COUNT - 1, 0, "why the rollout ended") \
     X(int32_t, triggered, 1, "i4", "1", 0, 1, 0, "1 if the flip was started") \
+    X(int32_t, no_go, 1, "i4", "1", 0, 1, 0, "1 if the policy called the approach off") \
     X(double, t_trigger_s, 1, "f8", "s", 0, 60, IVL_SIM_REQUIRED, "time of the trigger") \
     X(double, t_impact_s, 1, "f8", "s", 0, 60, IVL_SIM_REQUIRED, "time of the first contact") \
     X(double, t_end_s, 1, "f8", "s", 0, 60, IVL_SIM_REQUIRED, "duration of the rollout") \
@@ -69,6 +71,8 @@ typedef enum
     X(double, d_valid_norm, 1, "f8", "1", 0, 1, IVL_SIM_REQUIRED, "share of the approach's ticks with a valid distance, up to the trigger") \
     X(double, rrev_trigger, 1, "f8", "1/s", 0, 1000, IVL_SIM_REQUIRED, "RREV latched at the trigger") \
     X(double, of_y_trigger, 1, "f8", "rad/s", -1000, 1000, IVL_SIM_REQUIRED, "OF_y latched at the trigger") \
+    X(double, p_land, 1, "f8", "1", 0, 1, IVL_SIM_REQUIRED, "probability of a landing by which go or no-go was decided") \
+    X(double, d_decided_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "sensed distance at which go or no-go was decided") \
     X(double, d_min_m, 1, "f8", "m", -1, 20, IVL_SIM_REQUIRED, "smallest distance of the body origin from the ceiling's surface") \
     X(uint32_t, n_steps, 1, "u4", "1", 0, 4294967295.0, 0, "integration steps") \
     X(uint32_t, n_ticks, 1, "u4", "1", 0, 4294967295.0, 0, "ticks of the flight core's clock")

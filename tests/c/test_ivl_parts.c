@@ -11,7 +11,7 @@ static ivl_policy_t random_policy(rng_t *rng, uint32_t number, uint32_t seq)
     ivl_policy_t      policy = {.id = {.seq = seq, .form = (uint8_t)number}, .n = form->n_params};
     for (uint32_t i = 0; i < policy.n; i++)
     {
-        policy.theta[i] = rng_float(rng, form->params[i].lo, form->params[i].hi);
+        policy.theta[i] = rng_float(rng, ivl_form_group_of(form, i)->lo, ivl_form_group_of(form, i)->hi);
     }
     policy.id.crc = ivl_policy_crc(&policy);
     return policy;

@@ -88,13 +88,13 @@ static void test_a_form_asks_for_no_more_moment_than_it_says(void)
             ivl_policy_t policy = {.id = {.form = (uint8_t)number}, .n = form->n_params};
             for (uint32_t i = 0; i < policy.n; i++)
             {
-                policy.theta[i] = rng_float(&rng, form->params[i].lo, form->params[i].hi);
+                policy.theta[i] = rng_float(&rng, ivl_form_group_of(form, i)->lo, ivl_form_group_of(form, i)->hi);
             }
             const ivl_seen_t   seen = {.ceiling = {.d_ceil_m = rng_float(&rng, 0.01f, 3.0f), .valid = true},
                                        .cues = {rng_float(&rng, -5.0f, 25.0f), rng_float(&rng, -20.0f, 20.0f), true}};
             const ivl_action_t action = ivl_policy_decide(&policy, &seen);
             TEST_ASSERT_TRUE(action.moment_Nm >= 0.0f && action.moment_Nm <= form->moment_most_Nm(policy.theta));
-            TEST_ASSERT_FALSE(action.flip && !action.go);
+            TEST_ASSERT_TRUE(action.p_land >= 0.0f && action.p_land <= 1.0f);
             TEST_ASSERT_FALSE(action.flip && !(seen.cues.rrev_per_s > 0.0f));
         }
     }

@@ -14,13 +14,13 @@ enum
     N_PARAMS
 };
 
-static const ivl_form_param_t PARAMS[] = {
-    [RREV_0] = {"threshold_per_s", "R_0", "1/s", 1.0f, 0.0f, 20.0f, "threshold of RREV at rest"},
-    [RREV_VZ] = {"threshold_vz_per_m", "R_z", "1/m", 1.0f, -4.0f, 4.0f, "its change with the closing speed"},
-    [RREV_VX] = {"threshold_vx_per_m", "R_x", "1/m", 1.0f, -4.0f, 4.0f, "its change with the speed along the ceiling"},
-    [MOMENT_0] = {"flip_Nmm", "M_0", "N mm", 1.0e-3f, 0.0f, 0.02f, "moment at rest"},
-    [MOMENT_VZ] = {"flip_vz_mNs", "M_z", "mN s", 1.0e-3f, -0.005f, 0.005f, "its change with the closing speed"},
-    [MOMENT_MOST] = {"flip_most_Nmm", "M_most", "N mm", 1.0e-3f, 0.0f, 0.02f, "largest moment"},
+static const ivl_form_group_t GROUPS[] = {
+    [RREV_0] = {1, 0.0f, 20.0f, IVL_FORM_TEXT(1.0f, "1/s", "threshold_per_s", "R_0", "threshold of RREV at rest")},
+    [RREV_VZ] = {1, -4.0f, 4.0f, IVL_FORM_TEXT(1.0f, "1/m", "threshold_vz_per_m", "R_z", "its change with the closing speed")},
+    [RREV_VX] = {1, -4.0f, 4.0f, IVL_FORM_TEXT(1.0f, "1/m", "threshold_vx_per_m", "R_x", "its change with the speed along the ceiling")},
+    [MOMENT_0] = {1, 0.0f, 0.02f, IVL_FORM_TEXT(1.0e-3f, "N mm", "flip_Nmm", "M_0", "moment at rest")},
+    [MOMENT_VZ] = {1, -0.005f, 0.005f, IVL_FORM_TEXT(1.0e-3f, "mN s", "flip_vz_mNs", "M_z", "its change with the closing speed")},
+    [MOMENT_MOST] = {1, 0.0f, 0.02f, IVL_FORM_TEXT(1.0e-3f, "N mm", "flip_most_Nmm", "M_most", "largest moment")},
 };
 
 static ivl_action_t decide(const float theta[], const ivl_seen_t *seen)
@@ -29,7 +29,11 @@ static ivl_action_t decide(const float theta[], const ivl_seen_t *seen)
     const float threshold = theta[RREV_0] + theta[RREV_VZ] * vz + theta[RREV_VX] * vx;
     const float moment = theta[MOMENT_0] + theta[MOMENT_VZ] * vz;
     return (ivl_action_t){
-        .flip = seen->cues.rrev_per_s >= threshold, .go = vz < 50.0f, .moment_Nm = ivl_clamp(moment, 0.0f, theta[MOMENT_MOST])};
+        .flip = seen->cues.rrev_per_s >= threshold,
+        .go = vz < 50.0f,
+        .moment_Nm = ivl_clamp(moment, 0.0f, theta[MOMENT_MOST]),
+        .p_land = 1.0f,
+    };
 }
 
 static float moment_most_Nm(const float theta[])
@@ -38,8 +42,8 @@ static float moment_most_Nm(const float theta[])
 }
 
 const ivl_form_t ivl_form_six = {.name = "six",
-                                 .doc = "threshold and moment linear in the sensed velocities",
-                                 .params = PARAMS,
+                                 IVL_FORM_DOC("threshold and moment linear in the sensed velocities").groups = GROUPS,
+                                 .n_groups = N_PARAMS,
                                  .n_params = N_PARAMS,
                                  .decide = decide,
                                  .moment_most_Nm = moment_most_Nm};

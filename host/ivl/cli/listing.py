@@ -10,7 +10,7 @@ from ivl.cli import console
 from ivl.learners import LEARNERS
 from ivl.rewards import REWARDS, Reward
 
-HELP = """List what there is to choose from.
+HELP = """List vehicles, gears, learners and all other choices.
 
 \b
 Examples:

@@ -66,7 +66,7 @@ class Chosen:
         for setting in self.settings:
             name, _ = parse_setting(setting)
             if name in self.given:
-                raise ConfigError(f"--set {setting}: {FLAGS[name][0]} says it, too")
+                raise ConfigError(f"--set {setting}: already given by {FLAGS[name][0]}")
         if self.path is not None:
             return experiment.load(self.path, self.settings).task() | self.given
         data = {name: default_of(name) for name in ("vehicle", "gear")} | dict(self.defaults)

@@ -16,7 +16,7 @@ HELP = """Compare recorded flights with the simulation of a vehicle.
 
 Motion: each flip is flown once in the simulator, from the state that was recorded at the trigger; the differences up to
 200 ms later are given as root mean squares. Outcome: the same flip is flown many times, scattered by what a recording
-does not tell, and the share of simulated landings is held against what happened. Window: landings from hover at the
+does not tell, and the share of simulated landings is compared with what happened. Window: landings from hover at the
 moments that were flown, over RREV_c. A figure shows all of it.
 
 \b
@@ -36,7 +36,7 @@ def compare(
     folder: options.Folder,
     chosen: Chosen,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="RREV_C,M_YD", help="Landing rate of this policy too, from hover.")
+        list[str] | None, typer.Option(metavar="RREV_C,M_YD", help="Also give this policy's landing rate, from hover.")
     ] = None,
     rollouts: Annotated[int, typer.Option("--n", help="Simulated landings for each flight.", min=1, max=10000)] = 64,
     plot: Annotated[Path | None, typer.Option(help="Draw into FILE (.png, .svg or .pdf).")] = None,

@@ -16,7 +16,7 @@ HELP = """Identify a vehicle from the motion of recorded flights, and write it a
 
 The fit looks at pitch, rate and height after the trigger, at the time of the contact and at the height at which the
 vehicle hung: never at whether it landed. The vehicle file gives the prior (value and sigma of each fitted parameter),
-the parameter table the bounds. Intervals come from resampling whole flights. What the flights cannot separate is said.
+the parameter table the bounds. Intervals come from resampling whole flights. It names what the flights cannot separate.
 What differs from the vehicle's file (--set) is held, and goes into the new file.
 
 \b

@@ -24,7 +24,7 @@ cues and the policy are each flight's own.
 \b
 Examples:
   ivl flight replay flights/july
-      a short table and what it says
+      a short table and the conclusion
   ivl flight replay flights/july --uri pil:// --json
       the core on an emulated STM32F405: "bits" is the same
   ivl flight replay flights/july --step 0.001 --plot replay.png

@@ -1,0 +1,108 @@
+/// @file ivl_level_out.c
+#include "ivl_level_out.h"
+
+#include "ivl_math.h"
+
+// the vehicle hovers at least this far below its highest point, and descends there at this speed
+static const float DROP_M = 0.25f;
+static const float DESCENT_MPS = 1.0f;
+
+// the distance may be this many standard deviations shorter than it seems
+static const float SURE_SIGMAS = 2.0f;
+
+float ivl_level_out_rise_m(const ivl_cfg_t *cfg, float v_close_mps, float thrust_mps2)
+{
+    if (!(v_close_mps > 0.0f))
+    {
+        return 0.0f;
+    }
+    const float kept_mps2 = IVL_LIFT_NORM_MIN * cfg->gravity_mps2;
+    const float brake_mps2 = cfg->gravity_mps2 - kept_mps2;
+    // the thrust that fades with motor_lag adds this much speed, and adds it late
+    const float more_mps = ivl_clamp(thrust_mps2 - kept_mps2, 0.0f, thrust_mps2) * cfg->motor_lag_s;
+    const float v_mps = v_close_mps + more_mps;
+    const float rise_m = 0.5f * v_mps * v_mps / brake_mps2 - more_mps * cfg->motor_lag_s;
+    // a vehicle so slow that it turns before the thrust has faded
+    const float least_m = 0.5f * v_close_mps * v_close_mps / brake_mps2;
+    return (rise_m > least_m) ? rise_m : least_m;
+}
+
+bool ivl_level_out_is_last(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
+{
+    const float v_mps = seen->cues.rrev_per_s * seen->ceiling.d_ceil_m;
+    const float thrust_mps2 = cfg->gravity_mps2 + state->approach.accel_mps2 * state->approach.dir_z;
+    // what is seen may be old and uncertain, and the motors act after the next tick
+    const float late_s = state->derived.dt_s + (ivl_distance_is_present(cfg) ? 0.0f : seen->ceiling.age_s);
+    const float room_m = seen->ceiling.d_ceil_m - SURE_SIGMAS * seen->ceiling.d_sigma_m - cfg->d_touch_m - cfg->level_margin_m;
+    return !(room_m > ivl_level_out_rise_m(cfg, v_mps, thrust_mps2) + v_mps * late_s);
+}
+
+bool ivl_level_out_asked(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
+{
+    return !state->decision.made && (state->action.flip || ivl_level_out_is_last(cfg, state, seen));
+}
+
+void ivl_level_out_begin(ivl_state_t *state)
+{
+    // p_hold is still where the vehicle hovered before the approach
+    state->level = (ivl_level_t){.rises = true, .z_W_m = state->p_hold_W_m.z};
+}
+
+// the highest point: from here along the ceiling with what speed there is, until it is braked away
+static void turn(ivl_state_t *state)
+{
+    const ivl_sample_t *sample = &state->sense.sample;
+    const ivl_vec3_t    v = {sample->v_WB_mps.x, sample->v_WB_mps.y, 0.0f};
+    const float         speed_mps = sqrtf(ivl_dot(v, v));
+    state->level.rises = false;
+    state->level.speed_mps = speed_mps;
+    state->level.dir_W = (speed_mps > 0.0f) ? ivl_scale(v, 1.0f / speed_mps) : ivl_vec3(1.0f, 0.0f, 0.0f);
+    state->p_hold_W_m = sample->p_WB_m;
+    const float z_most_m = sample->p_WB_m.z - DROP_M;
+    state->level.z_W_m = (state->level.z_W_m < z_most_m) ? state->level.z_W_m : z_most_m;
+}
+
+// no error of position or velocity is left to the controller: it keeps the vehicle level, with the least thrust that it has
+static ivl_reference_t rise(const ivl_cfg_t *cfg, const ivl_sample_t *sample)
+{
+    const float fall_mps2 = (1.0f - IVL_LIFT_NORM_MIN) * cfg->gravity_mps2;
+    return (ivl_reference_t){.p_W_m = sample->p_WB_m, .v_W_mps = sample->v_WB_mps, .a_W_mps2 = {0.0f, 0.0f, -fall_mps2}};
+}
+
+static bool descends(const ivl_state_t *state)
+{
+    return state->p_hold_W_m.z > state->level.z_W_m;
+}
+
+ivl_reference_t ivl_level_out_next(const ivl_cfg_t *cfg, ivl_state_t *state)
+{
+    const ivl_sample_t *sample = &state->sense.sample;
+    if (state->level.rises && !(sample->v_WB_mps.z > 0.0f))
+    {
+        turn(state);
+    }
+    if (state->level.rises)
+    {
+        return rise(cfg, sample);
+    }
+    ivl_level_t    *level = &state->level;
+    const float     dt_s = state->derived.dt_s;
+    const float     dv_mps = ivl_clamp(cfg->approach_accel_mps2 * dt_s, 0.0f, level->speed_mps);
+    const float     fall_mps = descends(state) ? DESCENT_MPS : 0.0f;
+    ivl_reference_t ref = {
+        .p_W_m = state->p_hold_W_m,
+        .v_W_mps = ivl_scale(level->dir_W, level->speed_mps),
+        .a_W_mps2 = ivl_scale(level->dir_W, -dv_mps * cfg->tick_hz),
+    };
+    ref.v_W_mps.z = -fall_mps;
+    state->p_hold_W_m = ivl_add(state->p_hold_W_m, ivl_scale(level->dir_W, (level->speed_mps - 0.5f * dv_mps) * dt_s));
+    state->p_hold_W_m.z -= fall_mps * dt_s;
+    level->speed_mps -= dv_mps;
+    level->rest_s += ivl_level_out_rests(state) ? dt_s : 0.0f;
+    return ref;
+}
+
+bool ivl_level_out_rests(const ivl_state_t *state)
+{
+    return !state->level.rises && !(state->level.speed_mps > 0.0f) && !descends(state);
+}
