@@ -131,7 +131,8 @@ def test_flights_are_held_against_the_world_that_the_common_options_say(
     words = ["flight", command, str(made), *own]
     experiment = "experiments/paper_vertical.yaml"
     for options in (
-        [], ["--gear", "wide_long", "--set", "sense.latency=0.02"], ["--set", "estimator=kalman", "--set", "gear=wide_long"],
+        [], ["--gear", "wide_long", "--set", "sense.latency=0.02"],
+        ["--set", "estimator=kalman", "--set", "gear=wide_long"],
         ["--experiment", experiment], ["--experiment", experiment, "--vehicle", "crazyflie21"],
     ):  # fmt: skip
         assert cli.run([*words, *options]) == 2
