@@ -73,11 +73,8 @@ class Chosen:
                 raise ConfigError(f"--set {setting}: already given by {FLAGS[name][0]}")
         if self.path is not None:
             return experiment.load(self.path, self.settings).task() | self.given
-<<<<<<< HEAD
-        data = {name: default_of(name) for name in ("vehicle", "gear")} | dict(self.defaults)
-=======
-        data = {n: default_of(n) for n in ("vehicle", "gear")} if base is None else base.model_dump()
->>>>>>> policy
+        named = {name: default_of(name) for name in ("vehicle", "gear")} | dict(self.defaults)
+        data = named if base is None else base.model_dump()
         for setting in self.settings:
             apply_setting(data, setting, Task, _LABEL)
         return data | self.given
