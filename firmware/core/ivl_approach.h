@@ -19,7 +19,7 @@ typedef enum
 {
     IVL_SHAPE_HOLD,        ///< it is held
     IVL_SHAPE_ACCELERATE,  ///< it keeps growing, up to speed_max
-    IVL_SHAPE_RREV,  ///< it is held until RREV reaches shape_rrev, then RREV is held until shape_speed of it is left, then that is held
+    IVL_SHAPE_RREV,   ///< it is held until RREV reaches shape_rrev, then RREV is held until shape_speed of it is left, then that is held
     IVL_SHAPE_REGION  ///< it is held; speed and direction are not the commanded ones, but those of ivl_region.h
 } ivl_shape_t;
 

@@ -22,8 +22,8 @@ typedef struct
 /// A velocity in the x-z plane of W, and how to get there.
 typedef struct
 {
-    float vx_mps;  ///< >= 0
-    float vz_mps;  ///< >= 0
+    float vx_mps;      ///< >= 0
+    float vz_mps;      ///< >= 0
     float accel_mps2;  ///< of the straight change of velocity, > 0
 } ivl_aim_t;
 

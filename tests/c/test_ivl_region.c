@@ -232,7 +232,7 @@ static void test_reference_that_is_braked_at_the_ceiling_stays_inside_the_fence(
         ivl_cfg_t cfg = region_cfg();
         cfg.fence_x_m_max = rng_float(&rng, 0.1f, 2.0f);
         cfg.region_vx_mps = rng_float(&rng, 0.0f, 4.0f);
-        const float      d_m = rng_float(&rng, 0.1f, 2.5f), angle = rng_float(&rng, 0.35f, IVL_HALF_PI), speed = rng_float(&rng, 0.25f, 4.0f);
+        const float d_m = rng_float(&rng, 0.1f, 2.5f), angle = rng_float(&rng, 0.35f, IVL_HALF_PI), speed = rng_float(&rng, 0.25f, 4.0f);
         const ivl_room_t room = distance(d_m);
         ivl_approach_t   approach;
         ivl_approach_begin(&cfg, &approach, &room, ORIGIN, ORIGIN, speed, angle);
