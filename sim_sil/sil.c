@@ -71,6 +71,18 @@ static const ivl_sil_field_t DERIVED_FIELDS[] = {DERIVED(DERIVED_ROW)};
 static const ivl_sil_field_t REPLAY_IN_FIELDS[] = {IVL_SIM_REPLAY_INPUTS(REPLAY_IN_ROW)};
 static const ivl_sil_field_t REPLAY_OUT_FIELDS[] = {IVL_SIM_REPLAY_ROWS(REPLAY_OUT_ROW)};
 
+// clang-format off
+/// X(member of ivl_sim_surface_t, unit, doc)
+#define SURFACE(X) \
+    X(point_W_m, "m", "a point of the surface at time 0") \
+    X(normal_W, "1", "unit vector into the surface") \
+    X(velocity_W_mps, "m/s", "of the surface")
+// clang-format on
+#define SURFACE_ROW(name, unit, doc)                                                                                                       \
+    {#name, "f8", (uint32_t)offsetof(ivl_sim_surface_t, name), 3, unit, -IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, IVL_SIM_REQUIRED, doc},
+static const ivl_sil_field_t SURFACE_FIELDS[] = {SURFACE(SURFACE_ROW)};
+_Static_assert(sizeof(ivl_d3_t) == 3 * sizeof(double), "a vector is told as three numbers");
+
 typedef struct
 {
     const ivl_sil_field_t *fields;
@@ -84,7 +96,8 @@ static const table_t TABLES[] = {TABLE(PARAM_FIELDS, params_t),
                                  TABLE(TRACE_FIELDS, ivl_sim_trace_t),
                                  TABLE(DERIVED_FIELDS, derived_t),
                                  TABLE(REPLAY_IN_FIELDS, ivl_in_t),
-                                 TABLE(REPLAY_OUT_FIELDS, ivl_sim_replay_row_t)};
+                                 TABLE(REPLAY_OUT_FIELDS, ivl_sim_replay_row_t),
+                                 TABLE(SURFACE_FIELDS, ivl_sim_surface_t)};
 _Static_assert(sizeof TABLES / sizeof TABLES[0] == IVL_SIL_TABLE_COUNT, "one table each");
 
 int ivl_sil_abi_version(void)
@@ -165,6 +178,19 @@ void ivl_sil_model_derived(const void *model, void *derived)
 #undef VALUE
     };
     memcpy(derived, &d, sizeof d);
+}
+
+void ivl_sil_model_surface(const void *model, void *surface)
+{
+    const ivl_sim_model_t *m = model;
+    memcpy(surface, &m->surface, sizeof m->surface);
+}
+
+void ivl_sil_surface_forward(const void *surface, double forward_W[3])
+{
+    ivl_sim_surface_t s;
+    memcpy(&s, surface, sizeof s);
+    ivl_d3_store(forward_W, ivl_sim_surface_forward(&s));
 }
 
 typedef struct

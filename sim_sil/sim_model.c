@@ -149,6 +149,8 @@ static void tell_firmware(ivl_sim_model_t *model)
     cfg->motor_thrust_N_max = (float)raw->rotor_thrust_max_N;
     // the thrust goes with the square of the speed: it falls twice as fast
     cfg->motor_lag_s = (float)(0.5 * raw->rotor_tau_down_s);
+    // 0 tells that the supply never sags
+    cfg->vbat_V_rated = (raw->battery_voltage_V > 0.0) ? (float)raw->battery_rated_voltage_V : 0.0f;
     cfg->d_touch_m = (float)(top_m(model) + raw->world_sensed_gap_offset_m);
     cfg->h_ceil_m = (float)(raw->world_ceiling_height_m + raw->world_sensed_gap_offset_m);
 }

@@ -111,6 +111,7 @@
     X(flow, max, radps, "rad/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
     X(flow, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
     X(start, hold_time, s, "s", 0.0, 5.0, 0.39, "flown start: time at full speed that is left, before the ceiling would be reached") \
+    X(start, room, m, "m", 0.0, 10.0, 0.0, "flown start: at least this far below the plane of the cues, for an approach faster than commanded") \
     X(end, contact_time, s, "s", 0.01, 10.0, 1.0, "a rollout ends this long after the first contact") \
     X(end, missed_time, s, "s", 0.1, 10.0, 2.25, "or this long after the trigger, without a contact") \
     X(end, time_max, s, "s", 0.1, 60.0, 5.0, "or this long after its start") \

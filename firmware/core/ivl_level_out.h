@@ -1,7 +1,7 @@
 /// @file ivl_level_out.h
 /// Go / no-go: the last moment at which an approach can still be called off, and how the vehicle then keeps off the ceiling.
 /// The vehicle first rises, level, with the least thrust that the controller can hold it level with.  From the highest point on it brakes along
-/// the ceiling, descends to the height at which the approach began, and hovers there.                             [MODEL section 18]
+/// the ceiling, descends to the height at which the approach began, and hovers there.                             [MODEL section 14]
 #ifndef IVL_LEVEL_OUT_H
 #define IVL_LEVEL_OUT_H
 #include "ivl_state.h"

@@ -194,6 +194,14 @@ static void enter_ready(ivl_state_t *state)
     memset(&state->decision, 0, sizeof state->decision);
 }
 
+static void begin_approach(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
+{
+    const ivl_sense_t *sense = &state->sense;
+    const ivl_room_t   room = ivl_state_room(state, seen);
+    ivl_approach_begin(cfg, &state->approach, &room, sense->sample.p_WB_m, sense->sample.v_WB_mps, sense->cmd.speed_mps,
+                       sense->cmd.angle_rad);
+}
+
 static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, const ivl_seen_t *seen)
 {
     const ivl_sample_t *sample = &state->sense.sample;
@@ -207,7 +215,7 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
         break;
     case IVL_PHASE_APPROACH:
         memset(&state->decision, 0, sizeof state->decision);
-        ivl_approach_begin(cfg, &state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
+        begin_approach(cfg, state, seen);
         break;
     case IVL_PHASE_FLIP:
         state->triggered = true;

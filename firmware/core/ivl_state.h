@@ -79,4 +79,14 @@ typedef struct
     ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
     ivl_diag_t     diag;
 } ivl_state_t;
+
+/// What is left for an approach, as this tick knows it.
+static inline ivl_room_t ivl_state_room(const ivl_state_t *state, const ivl_seen_t *seen)
+{
+    const ivl_vitals_t *vitals = &state->guard.vitals;
+    return (ivl_room_t){
+        .d_ceil_m = seen->ceiling.valid ? seen->ceiling.d_ceil_m : 0.0f,
+        .vbat_V = (vitals->given != 0u) ? vitals->vbat_V : 0.0f,
+    };
+}
 #endif  // IVL_STATE_H

@@ -82,9 +82,10 @@ static void track(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_refe
     ivl_mixer_thrusts(cfg, &wrench, thrust_N);
 }
 
-static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, float rrev_per_s, float thrust_N[4])
+static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, const ivl_seen_t *seen, float thrust_N[4])
 {
-    ivl_reference_t ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
+    const ivl_room_t room = ivl_state_room(state, seen);
+    ivl_reference_t  ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
     switch (what)
     {
     case IVL_DRIVE_HOVER:
@@ -96,7 +97,8 @@ static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, fl
         track(cfg, state, &ref, thrust_N);
         break;
     case IVL_DRIVE_APPROACH:
-        ref = ivl_approach_next(cfg, &state->approach, rrev_per_s, state->derived.dt_s);
+        ivl_approach_look(cfg, &state->approach, &room);
+        ref = ivl_approach_next(cfg, &state->approach, seen->cues.rrev_per_s, state->derived.dt_s);
         track(cfg, state, &ref, thrust_N);
         break;
     case IVL_DRIVE_LEVEL:
@@ -146,7 +148,7 @@ void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_
     if (what != IVL_DRIVE_OFF)
     {
         out->motors_on = true;
-        drive(cfg, state, what, seen.cues.rrev_per_s, out->thrust_N);
+        drive(cfg, state, what, &seen, out->thrust_N);
         ivl_pwm_of_thrust(cfg, out->thrust_N, out->pwm);
         const ivl_wrench_t made = ivl_mixer_wrench(cfg, out->thrust_N);
         out->pitch_moment_Nm = made.moment_B_Nm.y;

@@ -20,7 +20,8 @@
     X(float, "ivl", "arm_y", arm_y_m, "m", 0.005, 0.2, 0.033, "distance of each motor from the b_x axis")                                    \
     X(float, "ivl", "torque_per_thrust", torque_per_thrust_m, "m", 1.0e-4, 0.1, 0.00612, "drag torque of a rotor per thrust")                \
     X(float, "ivl", "motor_thrust_max", motor_thrust_N_max, "N", 0.01, 5.0, 0.1615, "largest thrust of one motor")                           \
-    X(float, "ivl", "motor_lag", motor_lag_s, "s", 0.0, 0.5, 0.0, "time constant with which the thrust falls")                               \
+    X(float, "ivl", "motor_lag", motor_lag_s, "s", 0.0, 0.5, 0.0, "constant with which the thrust falls")                                    \
+    X(float, "ivl", "vbat_rated", vbat_V_rated, "V", 0.0, 30.0, 3.7, "battery below this gives less than motor_thrust_max; 0: it always gives that")\
     X(float, "ivl", "d_touch", d_touch_m, "m", -0.2, 0.5, 0.02, "distance of the plane at which a level vehicle touches the ceiling")        \
     X(float, "ivl", "h_ceil", h_ceil_m, "m", -100.0, 100.0, 2.1, "height in W of the plane that the cues refer to")
 
@@ -70,9 +71,13 @@
     X(float, "ivl", "tilt_abort", tilt_abort_rad, "rad", 0.2, 1.5, 1.3, "ready and approach abort beyond this sensed tilt")                  \
     /* approach [P] */                                                                                                                       \
     X(float, "ivl", "approach_accel", approach_accel_mps2, "m/s^2", 0.1, 20.0, 4.3, "acceleration along the approach path")                  \
-    X(uint8_t, "ivl", "shape", shape, "1", 0, 2, 0, "approach: 0 accelerate and hold, 1 accelerate, 2 hold RREV for a while")                \
+    X(uint8_t, "ivl", "shape", shape, "1", 0, 3, 0, "approach: 0 accelerate and hold, 1 accelerate, 2 hold RREV for a while, 3 into the region")\
     X(float, "ivl", "shape_rrev", shape_rrev_per_s, "1/s", 0.1, 20.0, 3.0, "shape 2: RREV that is held")                                     \
     X(float, "ivl", "shape_speed", shape_speed_norm, "1", 0.05, 1.0, 0.6, "shape 2: part of the speed at which holding RREV ends")           \
+    X(float, "ivl", "region_vx", region_vx_mps, "m/s", 0.0, 5.0, 1.2, "shape 3: at least this fast along the ceiling")                       \
+    X(float, "ivl", "region_vz", region_vz_mps, "m/s", 0.0, 5.0, 2.0, "shape 3: at least this fast towards the ceiling")                     \
+    X(float, "ivl", "region_rrev", region_rrev_per_s, "1/s", 0.5, 20.0, 4.0, "shape 3: that fast before RREV is this, a little less than a flip needs")\
+    X(float, "ivl", "thrust_use", thrust_use_norm, "1", 0.05, 1.0, 0.8, "shape 3: part of the thrust beyond the weight that may be used to accelerate")\
     X(float, "ivl", "speed_min", speed_mps_min, "m/s", 0.01, 10.0, 0.1, "smallest approach speed that is accepted")                          \
     X(float, "ivl", "speed_max", speed_mps_max, "m/s", 0.1, 10.0, 6.0, "largest approach speed that is accepted")                            \
     /* phases */                                                                                                                             \
@@ -158,6 +163,8 @@
     X(float, "ivl", "p_decided", ivl_state_t, decision.p_land, "1", "that probability when go or no-go was decided, 0 before")\
     X(float, "ivl", "d_decided", ivl_state_t, decision.d_ceil_m, "m", "distance at which go or no-go was decided, 0 before")\
     X(uint8_t, "ivl", "decided", ivl_state_t, decision.made, "1", "1 once go or no-go was decided in this approach")       \
+    X(float, "ivl", "aim_vx", ivl_state_t, approach.aim.vx_mps, "m/s", "velocity along W x that the approach aims at, 0 before")\
+    X(float, "ivl", "aim_vz", ivl_state_t, approach.aim.vz_mps, "m/s", "velocity along W z that the approach aims at, 0 before")\
     X(float, "ivl", "trg_d", ivl_state_t, snapshot.d_ceil_m, "m", "distance at the trigger")                             \
     X(float, "ivl", "trg_d_sigma", ivl_state_t, snapshot.d_sigma_m, "m", "standard deviation of the distance at the trigger")\
     X(float, "ivl", "trg_rrev", ivl_state_t, snapshot.rrev_per_s, "1/s", "RREV at the trigger")                          \

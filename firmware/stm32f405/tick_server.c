@@ -1,5 +1,5 @@
 /// @file tick_server.c
-/// Lock-step: one request in, one reply out, until the host closes its end.
+/// One request in, one reply out, until the host closes its end.
 #include "semihost.h"
 #include "serve.h"
 

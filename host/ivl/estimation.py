@@ -21,7 +21,7 @@ RREV_C_PER_S, MOMENT_Y_NMM = 4.8, 8.0
 """Policy of the study: the trigger is where the paper's policies have it."""
 EXPERIMENT = "experiments/paper_vertical.yaml"
 """Landing gear, speed and angle of the study are those of the paper's vertical experiment."""
-ACCELERATIONS_MPS2 = {"accelerate_hold": 4.3, "constant_acceleration": 1.8, "constant_rrev": 4.3}
+ACCELERATIONS_MPS2 = {"accelerate_hold": 4.3, "constant_acceleration": 1.8, "constant_rrev": 4.3, "region": 4.3}
 """Acceleration of each approach: that of the paper's experiment, and one that lasts until the trigger."""
 TARGET_MEDIAN, TARGET_P90 = 0.05, 0.12
 """Relative error of the filter with camera50_delay20 in accelerate_hold."""

@@ -87,7 +87,7 @@ def _in_order(data: dict[str, Any]) -> dict[str, Any]:
     if not given:
         return data
     if "theta" in data:
-        raise ValueError(f"theta: {given[0]} says it, too")
+        raise ValueError(f"theta: already given by {given[0]}")
     if missing:
         raise ValueError(f"{missing[0]}: is missing (the form {form.name} has {', '.join(names)})")
     for name in names:

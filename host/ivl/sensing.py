@@ -1,6 +1,6 @@
 """Approaches and estimators by name, as settings of the flight core."""
 
-APPROACHES = ("accelerate_hold", "constant_acceleration", "constant_rrev")
+APPROACHES = ("accelerate_hold", "constant_acceleration", "constant_rrev", "region")
 """Shapes of the approach, in the order of the flight core's numbers."""
 
 ESTIMATORS: dict[str, dict[str, float]] = {

@@ -20,10 +20,11 @@ const char *ivl_sim_end_name(int end)
 static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, double sin_angle)
 {
     const double speed = spec->speed_mps[0];
+    const double path = 0.5 * speed * speed / (double)model->firmware.approach_accel_mps2 + speed * model->raw.start_hold_time_s;
     switch ((ivl_sim_start_t)spec->start[0])
     {
     case IVL_SIM_START_FLOWN:
-        return sin_angle * (0.5 * speed * speed / (double)model->firmware.approach_accel_mps2 + speed * model->raw.start_hold_time_s);
+        return (sin_angle * path > model->raw.start_room_m) ? sin_angle * path : model->raw.start_room_m;
     case IVL_SIM_START_AT_TRIGGER:
         return spec->d_ceil_m[0];
     case IVL_SIM_START_IMPARTED:

@@ -1,5 +1,5 @@
 /// @file policy_fixture.h
-/// Policies of the constant form, for tests that need one, as a struct and as the packet that brings it.
+/// Policies for tests that need one, as a struct and as the packet that brings it.
 #ifndef POLICY_FIXTURE_H
 #define POLICY_FIXTURE_H
 #include "ivl_parts.h"
@@ -7,6 +7,22 @@
 static inline ivl_policy_t constant_policy(uint32_t seq, float rrev_c_per_s, float moment_Nm)
 {
     ivl_policy_t policy = {.id = {.seq = seq}, .n = 2, .theta = {rrev_c_per_s, moment_Nm}};
+    policy.id.crc = ivl_policy_crc(&policy);
+    return policy;
+}
+
+/// A policy for every approach that would flip at RREV = 4.8 /s in the middle of them, but expects no landing anywhere.
+static inline ivl_policy_t no_go_policy(uint32_t seq)
+{
+    ivl_policy_t policy = {.id = {.seq = seq}, .n = ivl_form_polynomial2.n_params};
+    while (ivl_form(policy.id.form) != &ivl_form_polynomial2)
+    {
+        policy.id.form++;
+    }
+    policy.theta[0] = 4.8f;
+    policy.theta[6] = 0.008f;
+    policy.theta[9] = 0.5f;    // go_p_min
+    policy.theta[10] = -3.0f;  // log-odds of a landing
     policy.id.crc = ivl_policy_crc(&policy);
     return policy;
 }

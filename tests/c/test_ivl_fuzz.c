@@ -28,7 +28,7 @@ typedef struct
 } flight_t;
 
 static uint64_t n_ticks_in[IVL_PHASE_COUNT];
-static uint64_t n_triggers, n_estimated, n_spoiled, n_cycles;
+static uint64_t n_triggers, n_estimated, n_general, n_spoiled, n_cycles;
 
 // ---- this file's own judgement of an input, from the stated ranges
 
@@ -90,7 +90,7 @@ static void random_cfg(flight_t *f)
     cfg->d_source = (uint8_t)((rng_below(&f->rng, 2) == 0u) ? 0u : rng_below(&f->rng, 4));
     cfg->d_predict = (uint8_t)rng_below(&f->rng, 2);
     cfg->of_source = (uint8_t)rng_below(&f->rng, 2);
-    cfg->shape = (uint8_t)rng_below(&f->rng, 3);
+    cfg->shape = (uint8_t)rng_below(&f->rng, 4);
     cfg->d_sigma_norm_max = rng_float(&f->rng, 0.05f, 10.0f);
     cfg->rrev_delay_s = rng_float(&f->rng, 0.0f, 0.03f);
     cfg->accel_delay_s = rng_float(&f->rng, 0.0f, 0.02f);
@@ -184,6 +184,31 @@ static void random_readings(flight_t *f)
     }
 }
 
+// of any form: the first parameter is a threshold or its constant part, some are out of range
+static void random_policy(flight_t *f)
+{
+    uint32_t n_forms = 0;
+    while (ivl_form(n_forms) != NULL)
+    {
+        n_forms++;
+    }
+    // half of them the paper's
+    const uint32_t    number = (rng_below(&f->rng, 2) == 0u) ? 0u : rng_below(&f->rng, n_forms);
+    const ivl_form_t *form = ivl_form(number);
+    ivl_policy_t      policy = {.id = {.seq = 1, .form = (uint8_t)number}, .n = form->n_params};
+    for (uint32_t i = 0; i < policy.n; i++)
+    {
+        const ivl_form_group_t *group = ivl_form_group_of(form, i);
+        // coefficients near 0 and thresholds that are met: the middle of a range is where flips happen
+        const float span = (group->hi > 1.0f) ? 0.02f * (group->hi - group->lo) : 0.25f * (group->hi - group->lo);
+        const float middle = (group->lo < 0.0f) ? 0.0f : group->lo + span;
+        policy.theta[i] = middle + rng_float(&f->rng, -1.05f, 1.05f) * span;
+    }
+    policy.theta[0] = rng_float(&f->rng, -0.1f, 8.0f);
+    policy.id.crc = ivl_policy_crc(&policy);
+    (void)ivl_policy_commit(&f->fix.cfg, &f->fix.state, &policy);
+}
+
 static void next_input(flight_t *f)
 {
     ivl_in_t      *in = &f->fix.in;
@@ -205,9 +230,7 @@ static void next_input(flight_t *f)
     }
     if (rng_below(&f->rng, 100) == 0u)
     {
-        const float        moment = rng_float(&f->rng, -0.001f, 0.022f);
-        const ivl_policy_t policy = constant_policy(1, rng_float(&f->rng, -1.0f, 8.0f), moment);
-        (void)ivl_policy_commit(&f->fix.cfg, &f->fix.state, &policy);
+        random_policy(f);
     }
 }
 
@@ -231,6 +254,20 @@ static void maybe_spoil(flight_t *f)
 
 // ---- what must hold
 
+/// The flip began where the policy says so, from what was latched alone, and after a go.
+static void check_region(const ivl_state_t *state)
+{
+    const ivl_snapshot_t *s = &state->snapshot;
+    const ivl_seen_t      seen = {.ceiling = {.valid = true, .d_ceil_m = s->d_ceil_m},
+                                  .cues = {.valid = true, .rrev_per_s = s->rrev_per_s, .of_y_radps = s->of_y_radps}};
+    const ivl_action_t    action = ivl_form(state->policy.id.form)->decide(state->policy.theta, &seen);
+    TEST_ASSERT_EQUAL_UINT32(state->policy.id.crc, s->policy.crc);
+    TEST_ASSERT_TRUE(action.flip);
+    TEST_ASSERT_EQUAL_FLOAT(action.moment_Nm, s->action.moment_Nm);
+    TEST_ASSERT_TRUE(state->decision.made && state->decision.go);
+    n_general += (state->policy.id.form != 0u) ? 1u : 0u;
+}
+
 static void check_trigger(flight_t *f, uint32_t n_trigger_before, bool is_pose_good)
 {
     const ivl_state_t *state = &f->fix.state;
@@ -247,7 +284,7 @@ static void check_trigger(flight_t *f, uint32_t n_trigger_before, bool is_pose_g
         TEST_ASSERT_EQUAL_UINT32(n_trigger_before + 1u, state->diag.n_trigger);
         TEST_ASSERT_TRUE(is_pose_good && approach_is_good(&f->fix.in.cmd, &f->fix.cfg));
         TEST_ASSERT_TRUE(vitals_are_good(&f->fix.in.vitals, &f->fix.cfg));
-        TEST_ASSERT_TRUE(state->snapshot.rrev_per_s >= state->policy.theta[0]);
+        check_region(state);
         TEST_ASSERT_TRUE((state->snapshot.rrev_per_s > 0.0f) && (state->snapshot.d_ceil_m > 0.0f));
         TEST_ASSERT_TRUE(state->snapshot.d_sigma_m >= 0.0f);
         TEST_ASSERT_TRUE(state->snapshot.d_sigma_m <= f->fix.cfg.d_sigma_norm_max * state->snapshot.d_ceil_m);
@@ -332,6 +369,7 @@ static void test_random_flights_have_visited_everything(void)
     }
     TEST_ASSERT_TRUE(n_triggers > N_FLIGHTS / 6u);
     TEST_ASSERT_TRUE(n_estimated > N_FLIGHTS / 50u);
+    TEST_ASSERT_TRUE(n_general > N_FLIGHTS / 50u);
     TEST_ASSERT_TRUE(n_cycles > n_triggers);
     TEST_ASSERT_TRUE(n_spoiled > N_TICKS_ALL / 30u);
 }

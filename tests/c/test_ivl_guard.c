@@ -3,8 +3,8 @@
 #include "ivl_cfg_name.h"
 #include "test_ivl_support.h"
 
-static const ivl_phase_t ALL[] = {IVL_PHASE_IDLE,  IVL_PHASE_READY,    IVL_PHASE_APPROACH, IVL_PHASE_FLIP,
-                                  IVL_PHASE_COAST, IVL_PHASE_ATTACHED, IVL_PHASE_DONE,     IVL_PHASE_ABORTED};
+static const ivl_phase_t ALL[] = {IVL_PHASE_IDLE,     IVL_PHASE_READY, IVL_PHASE_APPROACH, IVL_PHASE_FLIP,     IVL_PHASE_COAST,
+                                  IVL_PHASE_ATTACHED, IVL_PHASE_DONE,  IVL_PHASE_ABORTED,  IVL_PHASE_LEVEL_OUT};
 static fix_t             fix;
 static bool              is_tested[IVL_RULE_COUNT];
 
@@ -17,7 +17,7 @@ static ivl_vitals_t good_vitals(void)
 
 static bool is_before_trigger(ivl_phase_t phase)
 {
-    return (phase == IVL_PHASE_IDLE) || (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH);
+    return (phase == IVL_PHASE_IDLE) || (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_LEVEL_OUT);
 }
 
 /// In a phase, with vitals that are given and good.
@@ -389,6 +389,27 @@ static void test_rule_approach_time_aborts_an_approach_without_trigger(void)
     assert_rule(IVL_RULE_APPROACH_TIME, fix.state.guard.cause);
 }
 
+static void test_rule_level_out_time_lands_a_vehicle_that_nobody_asks_for_anything(void)
+{
+    is_tested[IVL_RULE_LEVEL_OUT_TIME] = true;
+    fix_to_phase(&fix, IVL_PHASE_LEVEL_OUT);
+    fix.in.v_WB_mps.z = 0.0f;
+    fix_ticks(&fix, fix.cfg.level_out_s_max - 0.1f);
+    assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+    fix_ticks(&fix, 0.2f);
+    assert_phase(IVL_PHASE_ABORTED, &fix);
+    assert_rule(IVL_RULE_LEVEL_OUT_TIME, fix.state.guard.cause);
+}
+
+static void test_rule_no_go_calls_off_what_would_not_land(void)
+{
+    is_tested[IVL_RULE_NO_GO] = true;
+    fix_to_phase(&fix, IVL_PHASE_LEVEL_OUT);
+    assert_rule(IVL_RULE_NO_GO, fix.state.guard.cause);
+    TEST_ASSERT_TRUE(fix.out.motors_on);
+    TEST_ASSERT_FALSE(fix.state.triggered);
+}
+
 // ---- after the trigger
 
 static void test_rule_contact_switches_the_motors_off_at_touch_down(void)
@@ -687,6 +708,8 @@ int main(void)
     RUN_TEST(test_rule_uncertain_aborts_when_the_position_is_not_known_well);
     RUN_TEST(test_rule_too_close_aborts_an_approach_that_has_not_triggered);
     RUN_TEST(test_rule_approach_time_aborts_an_approach_without_trigger);
+    RUN_TEST(test_rule_level_out_time_lands_a_vehicle_that_nobody_asks_for_anything);
+    RUN_TEST(test_rule_no_go_calls_off_what_would_not_land);
     RUN_TEST(test_rule_contact_switches_the_motors_off_at_touch_down);
     RUN_TEST(test_rule_hang_switches_the_motors_off_when_the_specific_force_is_reversed);
     RUN_TEST(test_rule_blind_cuts_a_flip_without_senses_as_if_its_time_were_over);

@@ -2,8 +2,8 @@
 /// Every exit of the phase table, every phase that must ignore a request, and faults injected in each phase.
 #include "test_ivl_support.h"
 
-static const ivl_phase_t ALL[] = {IVL_PHASE_IDLE,  IVL_PHASE_READY,    IVL_PHASE_APPROACH, IVL_PHASE_FLIP,
-                                  IVL_PHASE_COAST, IVL_PHASE_ATTACHED, IVL_PHASE_DONE,     IVL_PHASE_ABORTED};
+static const ivl_phase_t ALL[] = {IVL_PHASE_IDLE,     IVL_PHASE_READY, IVL_PHASE_APPROACH, IVL_PHASE_FLIP,     IVL_PHASE_COAST,
+                                  IVL_PHASE_ATTACHED, IVL_PHASE_DONE,  IVL_PHASE_ABORTED,  IVL_PHASE_LEVEL_OUT};
 static fix_t             fix;
 
 static void tick_to(ivl_phase_t expected)
@@ -15,7 +15,7 @@ static void tick_to(ivl_phase_t expected)
 
 static void test_phases_have_names(void)
 {
-    const char *const names[] = {"idle", "ready", "approach", "flip", "coast", "attached", "done", "aborted"};
+    const char *const names[] = {"idle", "ready", "approach", "flip", "coast", "attached", "done", "aborted", "level_out"};
     for (int i = 0; i < (int)IVL_PHASE_COUNT; i++)
     {
         TEST_ASSERT_EQUAL_STRING(names[i], ivl_phase_name((ivl_phase_t)i));
@@ -42,7 +42,8 @@ static void test_motors_run_in_four_phases_only(void)
         const ivl_phase_t p = ALL[i];
         fix_to_phase(&fix, p);
         fix_tick(&fix);
-        const bool expected = (p == IVL_PHASE_READY) || (p == IVL_PHASE_APPROACH) || (p == IVL_PHASE_FLIP) || (p == IVL_PHASE_ABORTED);
+        const bool expected = (p == IVL_PHASE_READY) || (p == IVL_PHASE_APPROACH) || (p == IVL_PHASE_FLIP) || (p == IVL_PHASE_ABORTED) ||
+                              (p == IVL_PHASE_LEVEL_OUT);
         TEST_ASSERT_EQUAL_INT(expected, fix.out.motors_on);
         TEST_ASSERT_EQUAL_INT(expected, fix.out.thrust_total_N > 0.0f);
         TEST_ASSERT_EQUAL_INT(!expected && (p != IVL_PHASE_IDLE), ivl_motors_latched_off(&fix.state));
@@ -62,8 +63,8 @@ static void test_request_idle_leads_to_idle_from_every_phase_at_once(void)
 
 static void test_request_abort_hovers_before_the_trigger_and_does_nothing_after_it(void)
 {
-    const ivl_phase_t expected[] = {IVL_PHASE_IDLE,  IVL_PHASE_ABORTED,  IVL_PHASE_ABORTED, IVL_PHASE_FLIP,
-                                    IVL_PHASE_COAST, IVL_PHASE_ATTACHED, IVL_PHASE_DONE,    IVL_PHASE_ABORTED};
+    const ivl_phase_t expected[] = {IVL_PHASE_IDLE,     IVL_PHASE_ABORTED, IVL_PHASE_ABORTED, IVL_PHASE_FLIP,   IVL_PHASE_COAST,
+                                    IVL_PHASE_ATTACHED, IVL_PHASE_DONE,    IVL_PHASE_ABORTED, IVL_PHASE_ABORTED};
     for (size_t i = 0; i < IVL_PHASE_COUNT; i++)
     {
         fix_to_phase(&fix, ALL[i]);
@@ -225,8 +226,8 @@ static void test_contact_cuts_in_flip_and_coast_when_the_option_is_on(void)
 
 static void test_contact_means_nothing_before_the_trigger(void)
 {
-    const ivl_phase_t from[] = {IVL_PHASE_IDLE, IVL_PHASE_READY, IVL_PHASE_APPROACH, IVL_PHASE_ABORTED};
-    for (int i = 0; i < 4; i++)
+    const ivl_phase_t from[] = {IVL_PHASE_IDLE, IVL_PHASE_READY, IVL_PHASE_APPROACH, IVL_PHASE_ABORTED, IVL_PHASE_LEVEL_OUT};
+    for (int i = 0; i < 5; i++)
     {
         fix_to_phase(&fix, from[i]);
         fix.in.f_B_mps2 = ivl_vec3(-40.0f, 0.0f, 0.0f);
@@ -304,8 +305,8 @@ static void test_aborted_stays_off_when_the_state_comes_back(void)
 
 static void test_short_gap_in_the_inputs_is_flown_through(void)
 {
-    const ivl_phase_t from[] = {IVL_PHASE_READY, IVL_PHASE_APPROACH, IVL_PHASE_FLIP, IVL_PHASE_ABORTED};
-    for (int i = 0; i < 4; i++)
+    const ivl_phase_t from[] = {IVL_PHASE_READY, IVL_PHASE_APPROACH, IVL_PHASE_FLIP, IVL_PHASE_ABORTED, IVL_PHASE_LEVEL_OUT};
+    for (int i = 0; i < 5; i++)
     {
         fix_to_phase(&fix, from[i]);
         const ivl_in_t good = fix.in;
@@ -321,8 +322,8 @@ static void test_short_gap_in_the_inputs_is_flown_through(void)
 // every kind of bad input, for longer than a sample may be old, in every phase
 static void test_spoiled_inputs_never_trigger_and_end_in_a_safe_phase_from_every_phase(void)
 {
-    const ivl_phase_t expected[] = {IVL_PHASE_IDLE,  IVL_PHASE_ABORTED,  IVL_PHASE_ABORTED, IVL_PHASE_COAST,
-                                    IVL_PHASE_COAST, IVL_PHASE_ATTACHED, IVL_PHASE_DONE,    IVL_PHASE_ABORTED};
+    const ivl_phase_t expected[] = {IVL_PHASE_IDLE,     IVL_PHASE_ABORTED, IVL_PHASE_ABORTED, IVL_PHASE_COAST,  IVL_PHASE_COAST,
+                                    IVL_PHASE_ATTACHED, IVL_PHASE_DONE,    IVL_PHASE_ABORTED, IVL_PHASE_ABORTED};
     for (size_t i = 0; i < IVL_PHASE_COUNT; i++)
     {
         for (uint32_t kind = 0; kind < SPOIL_COUNT; kind++)

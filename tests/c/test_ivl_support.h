@@ -141,9 +141,18 @@ static inline void fix_to_phase(fix_t *fix, ivl_phase_t phase)
         return;
     }
     // closing at 2.5 m/s, 0.5 m below the ceiling: RREV = 5
+    if (phase == IVL_PHASE_LEVEL_OUT)
+    {
+        const ivl_policy_t policy = no_go_policy(8);
+        TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix->cfg, &fix->state, &policy));
+    }
     fix->in.v_WB_mps.z = 2.5f;
     fix->in.p_WB_m.z = 1.6f;
     fix_tick(fix);
+    if (phase == IVL_PHASE_LEVEL_OUT)
+    {
+        return;
+    }
     if (phase == IVL_PHASE_FLIP)
     {
         return;
@@ -180,8 +189,8 @@ static inline void assert_output_sane(const fix_t *fix)
         TEST_ASSERT_TRUE(fix->out.motors_on || (fix->out.pwm[i] == 0u));
     }
     const ivl_phase_t phase = fix->out.phase;
-    const bool        may_run =
-        (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_FLIP) || (phase == IVL_PHASE_ABORTED);
+    const bool        may_run = (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_FLIP) ||
+                                (phase == IVL_PHASE_ABORTED) || (phase == IVL_PHASE_LEVEL_OUT);
     TEST_ASSERT_TRUE(may_run || !fix->out.motors_on);
 }
 

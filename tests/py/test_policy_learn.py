@@ -388,7 +388,7 @@ def test_a_landing_is_flown_on_what_the_policy_was_learned_on(path: Path, capsys
 @pytest.mark.parametrize("more", [["--rrev", "4.8"], ["--moment", "8"], ["--form", "constant"], ["--theta", "4.8,8"]])
 def test_two_words_for_a_policy_are_refused(path: Path, capsys: Capture, more: list[str]) -> None:
     assert cli.run(["rollout", "--policy", str(path), "--speed", "2.5", "--angle", "60", *more]) == 2
-    assert f"{more[0]} says it, too" in capsys.readouterr().err
+    assert f"already given by {more[0]}" in capsys.readouterr().err
 
 
 def test_a_start_of_another_form_is_refused(path: Path, tmp_path: Path, capsys: Capture) -> None:

@@ -128,7 +128,7 @@ def test_every_field_of_the_task_has_an_option_and_a_text() -> None:
         (["--speed", "2.5", "--angle", "90", "--approach", "fast"], "approach: value 'fast': unknown approach"),
         (["--speed", "2.5", "--angle", "90", "--set", "sensng=mocap"], "sensng: unknown key, did you mean 'sensing'?"),
         (["--experiment", ONBOARD, "--set", "sensng=mocap"], "onboard_only.yaml: sensng: unknown key"),
-        (["--experiment", ONBOARD, "--gear", "wide_long", "--set", "gear=wide_short"], "--gear says it, too"),
+        (["--experiment", ONBOARD, "--gear", "wide_long", "--set", "gear=wide_short"], "already given by --gear"),
         (["--experiment", ONBOARD, "--sensors", "camera5"], "no sensor set 'camera5'"),
     ],
 )

@@ -108,7 +108,7 @@ def test_defaults_and_persistent_values(sil, connected, wait_for):
             return answers[0]
 
         assert ask(cf.param.persistent_get_state) == (False, default, None)
-        # cflib sends a new value from a thread of its own, and the request to store at once: the value must be there first
+        # cflib sends a new value from a thread of its own, the request to store at once: wait for the value
         set_confirmed(cf, name, 0 if default else 1)
         assert ask(cf.param.persistent_store)
         state = ask(cf.param.persistent_get_state)

@@ -92,7 +92,7 @@ def _sensing(rng: np.random.Generator, source: int | None) -> dict[str, float]:
         "firmware.d_source": float(rng.integers(4) if source is None else source),
         "firmware.d_predict": float(rng.integers(2)),
         "firmware.of_source": float(rng.integers(2)),
-        "firmware.shape": float(rng.integers(3)),
+        "firmware.shape": float(rng.integers(4)),
         "firmware.rrev_delay": rng.uniform(0.0, 0.03),
         "firmware.range_delay": rng.uniform(0.0, 0.03),
         "firmware.accel_delay": rng.uniform(0.0, 0.02),

@@ -12,9 +12,9 @@ from ivl.errors import ConfigError, LinkError
 
 HELP = """Carry the link of a vehicle over a CAN bus: the end at the host, or the end at the vehicle.
 
-For the bench; not for free flight. The end at the host is a vehicle on a UDP port for cflib, cfclient and `--uri` of
-the other commands. The end at the vehicle talks to a software vehicle, or to a bench node that speaks CRTP on UDP. Any
-interface of python-can serves. Ctrl-C ends it. docs/CAN.md has frames, wiring and limits.
+This is for the bench, not for free flight. The end at the host looks like a vehicle on a UDP port to cflib, cfclient
+and `--uri` of the other commands. The end at the vehicle talks to a software vehicle, or to a bench node that speaks
+CRTP on UDP. Any interface of python-can works. Ctrl-C ends it. docs/CAN.md has frames, wiring and limits.
 
 \b
 Examples:

@@ -49,7 +49,7 @@ def estimate(
 ) -> None:
     """Judge the estimated distance; HELP is the text that people see."""
     if everything == (sensors is not None):
-        raise ConfigError("say either --sensors NAME or --all")
+        raise ConfigError("--sensors NAME or --all is needed")
     for name, value, allowed in (("approach", approach, APPROACHES), ("estimator", estimator, tuple(ESTIMATORS))):
         if value is not None and value not in allowed:
             raise ConfigError(f"--{name} {value}: unknown (allowed {', '.join(allowed)})")

@@ -25,7 +25,7 @@ Examples:
 def flash(
     image: Annotated[Path, typer.Argument(metavar="IMAGE", help="Firmware image (.bin).")],
     uri: Annotated[str, typer.Option(help="Radio link of the vehicle.")],
-    any_image: Annotated[bool, typer.Option("--any", help="Also an image without the app of this project.")] = False,
+    any_image: Annotated[bool, typer.Option("--any", help="Accept an image without the app of this project.")] = False,
 ) -> None:
     """Write a firmware image; HELP is the text that people see."""
     flasher.check_uri(uri)

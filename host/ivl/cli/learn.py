@@ -18,7 +18,7 @@ from ivl.policy import use
 HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
 
 EXPERIMENT is a YAML file; a name such as experiments/paper_vertical.yaml is also found inside the package.
-Everything lands in a run folder: resolved config, every rollout (run.sqlite), result.json and pictures.
+A run folder keeps everything: resolved config, every rollout (run.sqlite), result.json and pictures.
 
 \b
 Examples:
@@ -51,7 +51,7 @@ def learn(
     path: Annotated[str | None, typer.Argument(metavar="EXPERIMENT", help="YAML file of the experiment.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of learner and world.", min=0)] = None,
     trials: Annotated[
-        int | None, typer.Option(help="Run this many seeds in lock-step: seed, seed + 1, ...", min=1, max=100_000)
+        int | None, typer.Option(help="Run this many seeds together: seed, seed + 1, ...", min=1, max=100_000)
     ] = None,
     learner: Annotated[str | None, typer.Option(help="Learner by name; see `ivl list learners`.")] = None,
     settings: Annotated[
@@ -71,7 +71,7 @@ def learn(
         str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
     ] = None,
     other_world: Annotated[
-        bool, typer.Option("--other-world", help="Fly a software vehicle that simulates another world, too.")
+        bool, typer.Option("--other-world", help="Also fly a software vehicle that simulates another world.")
     ] = False,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,

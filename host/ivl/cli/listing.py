@@ -11,7 +11,7 @@ from ivl.learners import LEARNERS
 from ivl.policy import general
 from ivl.rewards import REWARDS, Reward
 
-HELP = """List what there is to choose from.
+HELP = """List vehicles, gears, learners and all other choices.
 
 \b
 Examples:

@@ -38,7 +38,7 @@ _COLOURS = {Status.GOOD: "green", Status.SETTLING: "yellow", Status.CONNECTING: 
 def mocap(
     config: Annotated[str | None, typer.Option(help="Configuration file, or the name of an example.")] = None,
     uri: Annotated[str | None, typer.Option(help="Vehicle that gets the poses.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="End after so long (with --json: 3).", min=0.1)] = None,
+    seconds: Annotated[float | None, typer.Option(help="End after so many seconds (with --json: 3).", min=0.1)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object at the end.")] = False,
     list_: Annotated[bool, typer.Option("--list", help="Name the examples in the package and exit.")] = False,
 ) -> int:

@@ -39,7 +39,7 @@ def load(path: Path | None, **said: str | float | None) -> PolicyFile | None:
         return None
     for name, value in said.items():
         if value is not None:
-            raise ConfigError(f"--policy {path}: --{name} says it, too")
+            raise ConfigError(f"--policy {path}: already given by --{name}")
     return file.load(path)
 
 
@@ -54,7 +54,7 @@ def theta_of(name: str, theta: str | None, rrev: float | None, moment: float | N
         named = {"--rrev": rrev, "--moment": moment}
         said = [option for option, value in named.items() if value is not None]
         if theta is not None and said:
-            raise ConfigError(f"--theta: {said[0]} says it, too")
+            raise ConfigError(f"--theta: already given by {said[0]}")
         if theta is None and form.name != forms.PAPER:
             names = ", ".join(form.names)
             raise ConfigError(f"--theta is missing: the form {form.name} has {form.n} parameters ({names})")

@@ -64,7 +64,7 @@ def rollout(
     data = chosen.fields(learned.tasks[0] if learned is not None else None)
     for name in ("speed_mps", "angle_deg"):
         if name not in data:
-            raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which says it)")
+            raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")
     world, flight = yamlfile.validate(LandingSpec, {**data, **policy, **numbers}, "options").fly()
     if trace:
         tracefile.write(trace, flight.rows)

@@ -43,7 +43,7 @@ def sil(
     ] = None,
     port: Annotated[int, typer.Option(help="UDP port of the first vehicle; 0 takes a free one.")] = 19850,
     bind: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 lets everybody fly.")] = "127.0.0.1",
-    vehicles: Annotated[int, typer.Option(help="How many, on consecutive ports.")] = 1,
+    vehicles: Annotated[int, typer.Option(help="Number of vehicles, on consecutive ports.")] = 1,
     speed: Annotated[str, typer.Option(metavar="N|max", help="Multiple of real time.")] = "1",
     lockstep: Annotated[bool, typer.Option(help="Time advances only as the client asks.")] = False,
     packets: Annotated[int, typer.Option(help="Packets/s to the client, at most, when time is not paced.")] = 8000,

@@ -15,7 +15,7 @@ from ivl.policy import use
 
 HELP = """Learn over a grid of approaches and landing gears: run a sweep FILE.
 
-FILE is YAML; a name such as sweeps/paper.yaml is also found inside the package. Tables land in a run folder, in
+FILE is YAML; a name such as sweeps/paper.yaml is also found inside the package. The run folder has tables in
 Parquet, one row per trial (see ivl.sweep.schema); results do not depend on workers, their number, or interruptions.
 
 \b
@@ -67,7 +67,7 @@ Settings = Annotated[
 ]
 Vary = Annotated[
     list[str] | None,
-    typer.Option("--vary", metavar="A.B=X,Y", help="Fly every value of a field, in place of what the file says of it."),
+    typer.Option("--vary", metavar="A.B=X,Y", help="Fly every value of a field, in place of the file's values."),
 ]
 TaskSize = Annotated[int | None, typer.Option(help="Trials per task; default: as fits the workers.", min=1, max=10_000)]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be flown, and stop.")]

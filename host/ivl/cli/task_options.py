@@ -3,11 +3,12 @@
     @task_options("vehicle", "gear", "gear_set")
     def command(chosen: Chosen, ...): ...
 
-The command gets `chosen` with what was said; its help has the texts and defaults of the fields themselves.
+The command gets `chosen` with what was said; its help has the texts and defaults of the fields themselves. A command
+with defaults of its own names them: `@task_options("vehicle", vehicle="crazyflie21")`.
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
 from typing import Annotated, Any, TypeVar
@@ -49,11 +50,13 @@ class Chosen:
         given: Fields of the task by name; those of which nothing was said are left out.
         settings: Texts of `--set`.
         path: Experiment that all else changes, if one was named.
+        defaults: Fields that the command starts from without an experiment, where they are not those of the task.
     """
 
     given: dict[str, Any] = field(default_factory=dict)
     settings: list[str] = field(default_factory=list)
     path: str | None = None
+    defaults: Mapping[str, Any] = field(default_factory=dict)
 
     def fields(self, base: BaseModel | None = None) -> dict[str, Any]:
         """Fields of the task as raw data: those of the experiment, of `base`, or the defaults, and what was said.
@@ -67,10 +70,11 @@ class Chosen:
         for setting in self.settings:
             name, _ = parse_setting(setting)
             if name in self.given:
-                raise ConfigError(f"--set {setting}: {FLAGS[name][0]} says it, too")
+                raise ConfigError(f"--set {setting}: already given by {FLAGS[name][0]}")
         if self.path is not None:
             return experiment.load(self.path, self.settings).task() | self.given
-        data = {n: default_of(n) for n in ("vehicle", "gear")} if base is None else base.model_dump()
+        named = {name: default_of(name) for name in ("vehicle", "gear")} | dict(self.defaults)
+        data = named if base is None else base.model_dump()
         for setting in self.settings:
             apply_setting(data, setting, Task, _LABEL)
         return data | self.given
@@ -83,12 +87,17 @@ class Chosen:
         return setup.world_of(gear)
 
 
-def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
-    """Give a command the options of some fields, `--experiment` and `--set`, instead of its parameter `chosen`."""
+def task_options(*names: str, **defaults: Any) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
+    """Give a command the options of some fields, `--experiment` and `--set`, instead of its parameter `chosen`.
+
+    Args:
+        *names: The fields.
+        **defaults: Values of fields where nobody says any, in place of the task's own.
+    """
 
     def give(command: Callable[..., Result]) -> Callable[..., Result]:
         own = inspect.signature(command, eval_str=True)
-        options = [*(_option(name) for name in names), *_general()]
+        options = [*(_option(name, defaults.get(name, default_of(name))) for name in names), *_general()]
         kept = [parameter for parameter in own.parameters.values() if parameter.name != "chosen"]
 
         @wraps(command)
@@ -96,7 +105,7 @@ def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[...,
             said = {name: arguments.pop(name) for name in (*names, "experiment", "settings")}
             path, settings = said.pop("experiment"), said.pop("settings")
             given = {name: value for name, value in said.items() if value is not None}
-            return command(chosen=Chosen(given, settings or [], path), **arguments)
+            return command(chosen=Chosen(given, settings or [], path, defaults), **arguments)
 
         first = [p for p in kept if p.default is inspect.Parameter.empty]
         rest = [p for p in kept if p.default is not inspect.Parameter.empty]
@@ -108,10 +117,9 @@ def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[...,
     return give
 
 
-def _option(name: str) -> inspect.Parameter:
+def _option(name: str, default: Any) -> inspect.Parameter:
     kind = _KINDS.get(name, str)
     text = Task.model_fields[name].description
-    default = default_of(name)
     shown = f"{text}  [default: {default}]" if isinstance(default, str) else text
     return _parameter(name, Annotated[kind | None, typer.Option(*FLAGS[name], help=shown)])
 

@@ -1,4 +1,4 @@
-"""The learning loop: ask, fly, score, tell, for one trial or for many in lock-step.
+"""The learning loop: ask, fly, score, tell, for one trial or for many together.
 
 A trial is an experiment. It gives the same policies, the same rollouts, the same bits, whether it runs alone, beside
 others, or in two halves with a `kill -9` between them, and whatever records it: every episode is read back from the
@@ -48,7 +48,7 @@ def trials_of(experiment: Experiment, n_trials: int = 1) -> list[Experiment]:
 
 
 class LearningRun:
-    """Trials that are advanced in lock-step through one source and one recorder."""
+    """Trials that go on together, episode by episode, through one source and one recorder."""
 
     def __init__(self, trials: Sequence[Experiment], source: RolloutSource, recorder: Recorder) -> None:
         """Start, or continue where the recorder stands.

@@ -199,7 +199,7 @@ class _Grid(Setup, Named):
         What is flown is part of it as far as it is varied; how it is learned is not, so that learners are compared on
         the same random numbers.
         """
-        name = f"{self.vehicle}|{self.gear_set}|{gear}|{speed_mps!r}|{angle_deg!r}"
+        name = f"{self.vehicle}|{self.gear_set}|{gear}|{float(speed_mps)!r}|{float(angle_deg)!r}"
         for path in sorted(self.vary):
             if path in AXES or path in _SEED_HAS or not is_flown(path):
                 continue

@@ -1,4 +1,4 @@
-"""Trials of one landing gear, flown in lock-step: each episode of all of them is one native batch on one thread.
+"""Trials of one landing gear, flown together: an episode of all of them is one native batch on one thread.
 
 A trial depends on its own name alone. It comes out bit for bit the same beside other trials or alone, and the same as
 `ivl learn` with its seed: both are the loop of `ivl.learning`, here recorded in arrays.

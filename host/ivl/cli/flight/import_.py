@@ -12,7 +12,7 @@ HELP = """Turn logs of other programs into a folder of flights, which every othe
 
 SOURCE is a log file, or a folder of them where the format has one. The folder that is made holds flights.parquet (one
 row a flight), samples.parquet (the time series, units in the names) and manifest.json (source, licence, frames, clock,
-what is absent). What the log does not say can be given as an option. What it says cannot be changed, but for the
+what is absent). An option can give what the log does not say. What the log says cannot be changed, except the
 outcome. A damaged file is refused with its line and column.
 
 \b
@@ -43,7 +43,7 @@ def import_(
     moment: Annotated[float | None, typer.Option(help="Policy: flip moment M_yd, N mm.")] = None,
     speed: Annotated[float | None, typer.Option(help="Approach speed, m/s.")] = None,
     angle: Annotated[float | None, typer.Option(help="Approach angle above the horizontal, degrees.")] = None,
-    h_plane: Annotated[float | None, typer.Option(help="Height of the plane that the cues are for, m.")] = None,
+    h_plane: Annotated[float | None, typer.Option(help="Height of the plane that the cues refer to, m.")] = None,
     h_surface: Annotated[float | None, typer.Option(help="Height of the ceiling's surface, m.")] = None,
     outcome: Annotated[
         str, typer.Option(metavar="N,N,...", help="Feet that held in each flight; - where unknown.")
@@ -51,7 +51,7 @@ def import_(
     judged_by: Annotated[str, typer.Option(help="Who saw the outcomes.")] = "operator",
     attempts: Annotated[str, typer.Option(metavar="last|all", help="Which attempts of a rollout.")] = "last",
     maps: Annotated[
-        list[str] | None, typer.Option("--map", metavar="COLUMN=VARIABLE[*FACTOR]", help="A column by another name.")
+        list[str] | None, typer.Option("--map", metavar="COLUMN=VARIABLE[*FACTOR]", help="The variable of a column.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:

@@ -71,7 +71,7 @@ def _row(info: Any, n: int, duration_s: float) -> dict[str, Any]:
 
 
 def _table(rows: list[dict[str, Any]]) -> Table:
-    """For 80 columns: where there is no room, names are wrapped, and numbers stay whole."""
+    """For 80 columns: names are wrapped where they do not fit, and numbers stay whole."""
     table = Table(box=None, pad_edge=False, header_style="bold")
     table.add_column("flight", overflow="fold")
     for name in ("RREV_c", "M_yd", "m/s", "deg", "samples", "s", "legs"):

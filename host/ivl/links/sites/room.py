@@ -196,7 +196,4 @@ class Room:
 
 def resting_by_estimate(vehicle: Vehicle, recording: Recording) -> Resting:
     """Where the vehicle's own estimate has it, with the attitude of the recorder's last row."""
-    if not len(recording.rows):
-        return Resting(vehicle.position_W_m[2], float("nan"))
-    x, y, _, _ = recording.rows["q_WB"][-1]
-    return Resting(vehicle.position_W_m[2], float(1.0 - 2.0 * (x * x + y * y)))
+    return Resting.of(vehicle.position_W_m, recording.rows["q_WB"][-1] if len(recording.rows) else None)
