@@ -200,9 +200,10 @@ FORMS_ON_STM32 := test_ivl_policy test_ivl_parts
 
 .PHONY: test-forms
 test-forms: setup-dev build toolchain cross-toolchain $(UNITY)/unity.c ## forms of a policy that no product file knows: learned, swept, reported, flown everywhere
-	$(say) 'test-forms: library, software vehicle and image with the forms of tests/forms, and their C tests'
+	$(say) 'test-forms: library, software vehicle, image and app with the forms of tests/forms, and their C tests'
 	@+$(NATIVE) FORMS=tests/forms lib sil $(FORMS_TESTS:%=run-%)
 	@+$(CROSS) FORMS=tests/forms build/stm32-Os-tests-forms/tick_server.elf $(FORMS_ON_STM32:%=run-%)
+	@+$(APP) FORMS=tests/forms check objects
 	$(say) 'test-forms: pytest tests/forms'
 	@$(BIN)/python -m pytest tests/forms $(PYTEST_ARGS)
 

@@ -71,6 +71,18 @@ static const ivl_sil_field_t DERIVED_FIELDS[] = {DERIVED(DERIVED_ROW)};
 static const ivl_sil_field_t REPLAY_IN_FIELDS[] = {IVL_SIM_REPLAY_INPUTS(REPLAY_IN_ROW)};
 static const ivl_sil_field_t REPLAY_OUT_FIELDS[] = {IVL_SIM_REPLAY_ROWS(REPLAY_OUT_ROW)};
 
+// clang-format off
+/// X(member of ivl_sim_surface_t, unit, doc)
+#define SURFACE(X) \
+    X(point_W_m, "m", "a point of the surface at time 0") \
+    X(normal_W, "1", "unit vector into the surface") \
+    X(velocity_W_mps, "m/s", "of the surface")
+// clang-format on
+#define SURFACE_ROW(name, unit, doc)                                                                                                       \
+    {#name, "f8", (uint32_t)offsetof(ivl_sim_surface_t, name), 3, unit, -IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, IVL_SIM_REQUIRED, doc},
+static const ivl_sil_field_t SURFACE_FIELDS[] = {SURFACE(SURFACE_ROW)};
+_Static_assert(sizeof(ivl_d3_t) == 3 * sizeof(double), "a vector is told as three numbers");
+
 typedef struct
 {
     const ivl_sil_field_t *fields;
@@ -84,7 +96,8 @@ static const table_t TABLES[] = {TABLE(PARAM_FIELDS, params_t),
                                  TABLE(TRACE_FIELDS, ivl_sim_trace_t),
                                  TABLE(DERIVED_FIELDS, derived_t),
                                  TABLE(REPLAY_IN_FIELDS, ivl_in_t),
-                                 TABLE(REPLAY_OUT_FIELDS, ivl_sim_replay_row_t)};
+                                 TABLE(REPLAY_OUT_FIELDS, ivl_sim_replay_row_t),
+                                 TABLE(SURFACE_FIELDS, ivl_sim_surface_t)};
 _Static_assert(sizeof TABLES / sizeof TABLES[0] == IVL_SIL_TABLE_COUNT, "one table each");
 
 int ivl_sil_abi_version(void)
@@ -165,6 +178,19 @@ void ivl_sil_model_derived(const void *model, void *derived)
 #undef VALUE
     };
     memcpy(derived, &d, sizeof d);
+}
+
+void ivl_sil_model_surface(const void *model, void *surface)
+{
+    const ivl_sim_model_t *m = model;
+    memcpy(surface, &m->surface, sizeof m->surface);
+}
+
+void ivl_sil_surface_forward(const void *surface, double forward_W[3])
+{
+    ivl_sim_surface_t s;
+    memcpy(&s, surface, sizeof s);
+    ivl_d3_store(forward_W, ivl_sim_surface_forward(&s));
 }
 
 typedef struct
@@ -318,6 +344,23 @@ int ivl_sil_policy_accepted(const void *model, int form, const double *theta)
     const ivl_sim_model_t *m = model;
     const ivl_policy_t     policy = ivl_sim_policy(form, theta, false);
     return (ivl_policy_check(&m->firmware, &policy) == IVL_OK) ? 1 : 0;
+}
+
+void ivl_sil_policy_decide(int form, const double *theta, const double *seen, size_t n, double *actions)
+{
+    const ivl_policy_t policy = ivl_sim_policy(form, theta, false);
+    for (size_t i = 0; i < n; i++)
+    {
+        const double      *in = seen + 3 * i;
+        const ivl_seen_t   this_tick = {.ceiling = {.d_ceil_m = (float)in[0], .valid = true},
+                                        .cues = {.rrev_per_s = (float)in[1], .of_y_radps = (float)in[2], .valid = true}};
+        const ivl_action_t action = ivl_policy_decide(&policy, &this_tick);
+        double            *out = actions + 4 * i;
+        out[0] = action.flip ? 1.0 : 0.0;
+        out[1] = action.go ? 1.0 : 0.0;
+        out[2] = (double)action.moment_Nm;
+        out[3] = (double)action.p_land;
+    }
 }
 
 uint32_t ivl_sil_policy_crc(int form, const double *theta)

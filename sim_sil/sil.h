@@ -31,6 +31,7 @@ typedef enum
     IVL_SIL_TABLE_DERIVED,     ///< what follows from the parameters
     IVL_SIL_TABLE_REPLAY_IN,   ///< what the flight core is told in one tick of a replay
     IVL_SIL_TABLE_REPLAY_OUT,  ///< what it answers
+    IVL_SIL_TABLE_SURFACE,     ///< the plane that is landed on
     IVL_SIL_TABLE_COUNT
 } ivl_sil_table_t;
 
@@ -49,6 +50,10 @@ const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *it
 void *ivl_sil_model_create(const double *params, char *error, size_t error_size);
 void  ivl_sil_model_free(void *model);
 void  ivl_sil_model_derived(const void *model, void *derived);
+void  ivl_sil_model_surface(const void *model, void *surface);
+
+/// Unit vector along a surface (IVL_SIL_TABLE_SURFACE) that is forward: the world's x axis, turned the shortest way from z up to the normal.
+void ivl_sil_surface_forward(const void *surface, double forward_W[3]);
 
 /// Flies n landings on n_threads threads (0: as many as the machine has cores).  Each outcome depends on its spec alone.
 /// @return 0
@@ -81,6 +86,10 @@ int ivl_sil_form_group(int number, uint32_t g, ivl_sil_field_t *field, const cha
 
 /// 1 if a flight core with this model's configuration puts the policy in force, else 0.
 int ivl_sil_policy_accepted(const void *model, int form, const double *theta);
+
+/// What a policy decides of n things that are seen, three numbers each: distance to the ceiling (m), RREV (1/s), OF_y (rad/s).
+/// @param[out] actions  four numbers each: 1 to flip, 1 to go, moment of the flip (N m), probability of a landing
+void ivl_sil_policy_decide(int form, const double *theta, const double *seen, size_t n, double *actions);
 
 /// CRC-32 of a policy, as the vehicle computes it; 0 if there is no such form.
 uint32_t ivl_sil_policy_crc(int form, const double *theta);

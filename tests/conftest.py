@@ -7,7 +7,8 @@ from pathlib import Path
 from hypothesis import HealthCheck, settings
 
 # Flights with known answers are replayed by the tests of flights and by those on the emulated chip.
-sys.path[:0] = [str(Path(__file__).parent / "flight")]
+# What tests of several folders use is in `shared`.
+sys.path[:0] = [str(Path(__file__).parent / name) for name in ("flight", "shared")]
 
 # Who starts the tests in the background may have told them to ignore Ctrl-C; programs under test would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)

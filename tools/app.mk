@@ -7,23 +7,30 @@ CROSS ?= arm-none-eabi-
 UNITY := build/unity
 
 SOURCES := $(wildcard firmware/core/*.c firmware/app/*.c)
-HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h firmware/sdk/*.h)
+
+# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h
+OWN     := $(if $(FORMS),-$(subst /,-,$(FORMS)))
+ifneq ($(FORMS),)
+FORMS_SOURCES := $(wildcard $(FORMS)/*.c)
+FORMS_FLAGS   := -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+endif
+HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h firmware/sdk/*.h $(if $(FORMS),$(FORMS)/*.h))
 
 # ---- host: sanitizers on, strict warnings on our own files
 
-HOST       := build/app
+HOST       := build/app$(OWN)
 HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=all \
               -Wall -Wextra -Wdouble-promotion -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes -Werror \
-              -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -Itests/c -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
-HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) tests/app/sdk_double.c tests/app/test_app.c tests/c/default_fixture.c)
+              -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -Itests/c -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE $(FORMS_FLAGS)
+HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) $(FORMS_SOURCES) tests/app/sdk_double.c tests/app/test_app.c tests/c/default_fixture.c)
 
 # ---- Cortex-M4F: the SDK's flags, and the one of our Kbuild files
 
-ARM       := build/firmware
+ARM       := build/firmware$(OWN)
 ARM_FLAGS := -Os -Werror -Wall -Wmissing-braces -fno-strict-aliasing -std=gnu11 -fno-math-errno -Wdouble-promotion -ffunction-sections \
              -fdata-sections -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -g3 -ffp-contract=off -fstack-usage -DCONFIG_ENABLE_CPX=1 \
-             -Ifirmware/core -Ifirmware/app -isystem firmware/sdk
-ARM_OBJ   := $(patsubst firmware/%.c,$(ARM)/%.o,$(SOURCES))
+             -Ifirmware/core -Ifirmware/app -isystem firmware/sdk $(FORMS_FLAGS)
+ARM_OBJ   := $(patsubst firmware/%.c,$(ARM)/%.o,$(SOURCES)) $(patsubst $(FORMS)/%.c,$(ARM)/forms/%.o,$(FORMS_SOURCES))
 # what the objects may ask of the world: the SDK's functions that firmware/sdk declares, and these of the C library
 LIBRARY   := memcpy|memset|memcmp|memmove|strlen
 
@@ -49,7 +56,16 @@ $(HOST)/%.o: %.c $(HEADERS) tools/app.mk
 objects: $(ARM_OBJ)
 	@tools/check_app.sh $(CROSS) '$(LIBRARY)' $(ARM)
 
+define compile_arm
+@echo '  CC    $@'
+@mkdir -p $(@D)
+@$(CROSS)gcc $(ARM_FLAGS) -c -o $@ $<
+endef
+
 $(ARM)/%.o: firmware/%.c $(HEADERS) tools/app.mk
-	@echo '  CC    $@'
-	@mkdir -p $(@D)
-	@$(CROSS)gcc $(ARM_FLAGS) -c -o $@ $<
+	$(compile_arm)
+
+ifneq ($(FORMS),)
+$(ARM)/forms/%.o: $(FORMS)/%.c $(HEADERS) tools/app.mk
+	$(compile_arm)
+endif

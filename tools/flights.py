@@ -130,7 +130,7 @@ def good_fits(flights: store.Flights, result: identify.Identification) -> dict[s
     figures = []
     for number, row in enumerate(rng.choice(len(result.draws), N_GOOD_FITS, replace=False)):
         values = dict(zip((e.name for e in result.estimates), map(float, result.draws[row]), strict=True))
-        one = compare.compare(flights, VEHICLE, GEAR, GEAR_SET, values, 32, number, POLICIES).summary()
+        one = compare.compare(flights, World(VEHICLE, GEAR, GEAR_SET, None, **values), 32, number, POLICIES).summary()
         figures.append([one["landed_auc"], one["landed_brier"], one["two_leg_share"]["simulated"], one["pitch_rms_deg"],
                         *(p["rate"] for p in one["policies"])])  # fmt: skip
         print(f"equally good fits: {number + 1} of {N_GOOD_FITS}", file=sys.stderr, flush=True)
@@ -174,7 +174,7 @@ def measure(logs: list[Path], spin_downs: list[Path]) -> dict[str, Any]:
     world = World(VEHICLE, GEAR, GEAR_SET)
     compared: dict[str, Any] = {}
     for label, vehicle, changes in (("now", VEHICLE, {}), ("before", VEHICLE, BEFORE), ("habas2021", "habas2021", {})):
-        result = compare.compare(usable, vehicle, GEAR, GEAR_SET, changes, N_ROLLOUTS, 0, POLICIES)
+        result = compare.compare(usable, World(vehicle, GEAR, GEAR_SET, None, **changes), N_ROLLOUTS, 0, POLICIES)
         compared[label] = result.summary()
         if label == "now":
             draw(result)
@@ -202,7 +202,7 @@ def identify_from(flights: store.Flights, wrong: dict[str, float], held_out: Any
     with tempfile.TemporaryDirectory() as text:
         path = Path(text) / "before.yaml"
         path.write_text(identify.vehicle_text(VEHICLE, wrong, PRIOR_SIGMAS), encoding="utf-8")
-        return identify.identify(flights, str(path), GEAR, GEAR_SET, list(FITTED), held_out=held_out,
+        return identify.identify(flights, World(str(path), GEAR, GEAR_SET), list(FITTED), held_out=held_out,
                                  progress=lambda line: print(line, file=sys.stderr, flush=True))  # fmt: skip
 
 

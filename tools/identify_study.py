@@ -24,6 +24,7 @@ from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.landing_flight import Rollout
 from ivl.links.options import Options
 from ivl.silproc import SilProcess
+from ivl.world import World
 
 WRONG = {"rotor.tau_down": 0.095, "sense.latency": 0.01, "world.sensed_gap_offset": 0.02}
 """Added to the true value; also the standard deviation that the wrong file states."""
@@ -68,7 +69,8 @@ def study(repetitions: int, n_flights: int, first_seed: int) -> dict[str, list[d
         with CrazyflieSource(server.uri, chosen, Options(keep_recordings=True)) as source:
             for seed in range(first_seed, first_seed + repetitions):
                 flights = record(folder, source, n_flights, seed)
-                result = identify.identify(flights, wrong, chosen.gear, chosen.gear_set, list(WRONG), seed=seed)
+                start = World(wrong, chosen.gear, chosen.gear_set)
+                result = identify.identify(flights, start, list(WRONG), seed=seed)
                 for one in result.estimates:
                     low, high = one.interval
                     truth = world.params.values[one.name]

@@ -5,7 +5,8 @@ path as given, else inside this package), applies settings, and checks everythin
 included.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
@@ -185,16 +186,28 @@ class Experiment(Task, Named):
 
 
 def list_experiments() -> list[str]:
-    """Experiments that ship with the package, as paths that `load` takes."""
-    return [f"experiments/{path.name}" for path in sorted(EXPERIMENTS_DIR.glob("*.yaml"))]
+    """Experiments that ship with the package, as paths that `load` takes; those of `ivl.policy` are not among them."""
+    return [f"experiments/{path.name}" for path in sorted(EXPERIMENTS_DIR.glob("*.yaml")) if not _is_general(path)]
 
 
-def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experiment:
+def list_general() -> list[str]:
+    """Experiments for every approach that ship with the package, as paths that `ivl.policy.general.load` takes."""
+    return [f"experiments/{path.name}" for path in sorted(EXPERIMENTS_DIR.glob("*.yaml")) if _is_general(path)]
+
+
+def _is_general(path: Path) -> bool:
+    return path.name.startswith("general")
+
+
+def load(
+    path: str, settings: Sequence[str] = (), change: Callable[[dict[str, Any]], None] | None = None, **replacements: Any
+) -> Experiment:
     """Read, change and check an experiment.
 
     Args:
         path: A file; if it does not exist, the same path inside the package.
         settings: "a.b=value" each: a field of the experiment, or a world parameter such as "sense.latency=0.01".
+        change: Changes the raw data before settings and replacements do.
         **replacements: Fields to replace; None leaves what the file says. `learner` takes a name and drops the options.
 
     Raises:
@@ -202,6 +215,10 @@ def load(path: str, settings: Sequence[str] = (), **replacements: Any) -> Experi
     """
     file = locate(path, list_experiments())
     data = read_mapping(file)
+    if "tasks" in data:
+        raise ConfigError(f"{file.name}: tasks: an experiment for every approach; learn it with ivl policy learn")
+    if change is not None:
+        change(data)
     replace(data, replacements)
     for setting in settings:
         apply_setting(data, setting, Experiment, file.name)

@@ -24,7 +24,8 @@ ABI_VERSION = 2
 LIBRARY_ENV = "IVL_NATIVE_LIBRARY"  # another build of the library, for example one with sanitizers
 DEFAULT_LIBRARY = Path(__file__).parent / "_native" / "libivl_sil.so"
 
-TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED, TABLE_REPLAY_IN, TABLE_REPLAY_OUT = range(7)
+TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED = range(5)
+TABLE_REPLAY_IN, TABLE_REPLAY_OUT, TABLE_SURFACE = range(5, 8)
 LAYOUT_RECORD_HEADER, LAYOUT_RECORD_ROW, LAYOUT_CONFIG, LAYOUT_LOGS = range(0x100, 0x104)
 _ERROR_BYTES = 256
 _TRACE_ROWS = 1024  # first guess; the call says when it needs more
@@ -102,6 +103,7 @@ class NativeLibrary:
         self.derived_fields, self.derived_dtype = self._table(TABLE_DERIVED)
         self.replay_in_fields, self.replay_in_dtype = self._table(TABLE_REPLAY_IN)
         self.replay_out_fields, self.replay_out_dtype = self._table(TABLE_REPLAY_OUT)
+        self.surface_fields, self.surface_dtype = self._table(TABLE_SURFACE)
 
     def _fields(self, table: int, call: str = "ivl_sil_table") -> tuple[tuple[Field, ...], int]:
         n_fields, item_size = ctypes.c_uint32(), ctypes.c_uint32()
@@ -169,11 +171,35 @@ class NativeLibrary:
         theta = self.theta(theta_si)
         return int(self._c.ivl_sil_policy_crc(form, _pointer(theta)))
 
+    def decide(
+        self, form: int, theta_si: npt.NDArray[np.float64], seen: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]:
+        """What a policy decides, as the flight core does it.
+
+        Args:
+            form: Number of its form.
+            theta_si: Its parameters in SI units.
+            seen: Distance to the ceiling (m), RREV (1/s) and OF_y (rad/s), shape (n, 3).
+
+        Returns:
+            1 to flip, 1 to go, moment of the flip (N m) and probability of a landing, shape (n, 4).
+        """
+        theta, seen = self.theta(theta_si), np.ascontiguousarray(seen, dtype=np.float64)
+        actions = np.zeros((len(seen), 4))
+        self._c.ivl_sil_policy_decide(form, _pointer(theta), _pointer(seen), len(seen), _pointer(actions))
+        return actions
+
     def theta(self, theta_si: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Parameters with zeros behind them, as many as the library takes."""
         theta = np.zeros(self.spec_fields["theta"].count)
         theta[: theta_si.size] = theta_si
         return theta
+
+    def surface_forward(self, surface: npt.NDArray[np.void]) -> npt.NDArray[np.float64]:
+        """Unit vector along a surface (one record of `surface_dtype`) that is forward, in the world."""
+        forward = np.zeros(3)
+        self._c.ivl_sil_surface_forward(_pointer(surface), _pointer(forward))
+        return forward
 
     def end_reason(self, code: int) -> str:
         """Name of an outcome's `end_reason`."""
@@ -225,6 +251,12 @@ class NativeModel:
         """Quantities that the library derives once from the parameters, one record of `derived_dtype`."""
         record = np.zeros(1, dtype=self._library.derived_dtype)
         self._library._c.ivl_sil_model_derived(self._handle, _pointer(record))
+        return record
+
+    def surface(self) -> npt.NDArray[np.void]:
+        """The plane that is landed on, one record of `surface_dtype`."""
+        record = np.zeros(1, dtype=self._library.surface_dtype)
+        self._library._c.ivl_sil_model_surface(self._handle, _pointer(record))
         return record
 
     def config(self) -> tuple[npt.NDArray[np.void], int]:
@@ -344,12 +376,15 @@ def _declare(c: Any) -> None:
         ("ivl_sil_model_create", ptr, (ptr, ctypes.c_char_p, size)),
         ("ivl_sil_model_free", None, (ptr,)),
         ("ivl_sil_model_derived", None, (ptr, ptr)),
+        ("ivl_sil_model_surface", None, (ptr, ptr)),
+        ("ivl_sil_surface_forward", None, (ptr, ptr)),
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_replay", c_int, (ptr, ptr, c_int, ptr, ptr, size, ptr)),
         ("ivl_sil_form", ctypes.c_uint32, (c_int, textp, textp)),
         ("ivl_sil_form_group", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField), textp)),
         ("ivl_sil_policy_accepted", c_int, (ptr, c_int, ptr)),
+        ("ivl_sil_policy_decide", None, (c_int, ptr, ptr, size, ptr)),
         ("ivl_sil_policy_crc", ctypes.c_uint32, (c_int, ptr)),
         ("ivl_sil_hover", c_int, (ptr, ptr, size, ptr, size, double, ptr, size)),
         ("ivl_sil_end_reason", ctypes.c_char_p, (c_int,)),

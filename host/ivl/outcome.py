@@ -49,8 +49,11 @@ def clean(outcomes: Outcomes) -> BoolArray:
 
 
 def solved(rate: Any, possible: Any = 1.0, share: float = SOLVED_SHARE) -> Any:
-    """Whether landing rates (a number, array or column) reach a share of the possible rate; NaN does not."""
-    return rate >= share * possible
+    """Whether landing rates (a number, array or column) reach a share of the possible rate; NaN does not.
+
+    Where no landing is possible, nothing is solved.
+    """
+    return (rate >= share * possible) & (possible > 0)
 
 
 def stuck(rate: Any, possible: Any = 1.0) -> Any:

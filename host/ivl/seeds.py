@@ -14,6 +14,11 @@ class Purpose(IntEnum):
     CHECK = 3
     GRID = 4
     START = 5
+    SEARCH = 6
+    SELECT = 7
+    GO = 8
+    HELD_OUT = 9
+    ASSESS = 10
 
 
 def derive(seed: int, purpose: Purpose) -> int:

@@ -398,6 +398,7 @@ def _clear_unfinished(folder: Path) -> None:
     """Remove what a creation that was cut off left behind; anything else in the folder is not ours to touch."""
     ours = {
         "run.sqlite",
+        "run.sqlite-journal",  # SQLite has one while it switches to WAL
         "run.sqlite-wal",
         "run.sqlite-shm",
         "config.yaml",

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from ivl import forms, model, native
 from ivl.errors import ArgumentError, NativeError
+from ivl.surface import Surface
 
 START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2, "state": 3}
 _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within seconds
@@ -97,7 +98,12 @@ class Trace:
 
 
 class World:
-    """One vehicle with one landing gear under a ceiling. Immutable, may be shared by threads, can be pickled."""
+    """One vehicle with one landing gear under a ceiling. Immutable, may be shared by threads, can be pickled.
+
+    Attributes:
+        params: Checked parameters.
+        surface: The plane that is landed on, as the library made it of them.
+    """
 
     def __init__(
         self,
@@ -131,6 +137,7 @@ class World:
             self._native = self._library.create_model(params.vector())
         except NativeError as error:
             raise NativeError(f"vehicle {self.vehicle}, gear {self.gear_set}/{self.gear}: {error}") from error
+        self.surface = Surface.of(self._native)
 
     def __getstate__(self) -> dict[str, Any]:
         """What pickling carries: the checked parameters, never the files' names alone nor the native handle."""
@@ -162,7 +169,7 @@ class World:
         for name, value in overrides.items():
             values[name], origin[name] = model.check_override(name, value), "override"
         world = object.__new__(World)
-        world.__dict__.update({k: v for k, v in self.__dict__.items() if k not in ("params", "_native")})
+        world.__dict__.update({k: v for k, v in self.__dict__.items() if k not in ("params", "surface", "_native")})
         world.overrides = {**self.overrides, **overrides}
         world._build(model.Parameters(values, origin))
         return world
@@ -176,6 +183,11 @@ class World:
         """Values that the library derives once from the parameters (mass with legs, inertia, mixer ...), by name."""
         record = self._native.derived()[0]
         return {name: record[name].tolist() for name in self._library.derived_dtype.names or ()}
+
+    def hanging_gap_m(self) -> float:
+        """Distance of the body origin from the surface when it hangs on four legs at their rest angle, m."""
+        p = self.params.values
+        return p["leg.length"] * math.cos(math.radians(p["leg.angle"])) + p["leg.foot_radius"] - p["leg.hip_z"]
 
     def end_reason(self, code: int) -> str:
         """Name of an outcome's `end_reason`."""
@@ -311,9 +323,9 @@ class World:
             raise ArgumentError(f"setpoints: all values must be finite and within +-{_HOVER_M_MAX:g}")
         if (points[..., 0, 0] != 0.0).any() or (np.diff(points[..., 0]) <= 0.0).any():
             raise ArgumentError("setpoints: the times of a flight must begin with 0 and grow")
-        ceiling_m = self.params.values["world.ceiling_height"]
-        if not (points[..., 3] < ceiling_m).all():
-            raise ArgumentError(f"setpoints: z must stay below the ceiling, {ceiling_m:g} m")
+        gap_m = self.surface.gap_m(points[..., 1:], points[..., 0])
+        if not (gap_m > 0.0).all():
+            raise ArgumentError(f"setpoints: all must be in front of the surface, one is {-gap_m.min():g} m behind it")
         return points
 
     def _specs(

@@ -13,7 +13,7 @@ ivl_d3_t ivl_sim_surface_forward(const ivl_sim_surface_t *surface)
     const ivl_d3_t n = surface->normal_W, x = ivl_d3(1.0, 0.0, 0.0);
     if (!(n.z > DOWN))
     {
-        return x;
+        return ivl_d3_sub(x, ivl_d3_scale(n.x, n));  // along the surface, and of unit length to 1e-9
     }
     return ivl_d3_sub(x, ivl_d3_scale(n.x / (1.0 + n.z), ivl_d3(n.x, n.y, n.z + 1.0)));
 }

@@ -765,6 +765,40 @@ static void test_policy_with_a_wrong_checksum_or_form_is_refused(void)
     TEST_ASSERT_EQUAL_UINT32(42, ivl_app.state.policy.id.seq);
 }
 
+static void test_policy_of_every_form_is_taken_in_parts(void)
+{
+    start();
+    uint32_t number = 0;
+    for (; ivl_form(number) != NULL; number++)
+    {
+        const ivl_form_t *form = ivl_form(number);
+        ivl_policy_t      policy = {.id = {.seq = 50u + number, .form = (uint8_t)number}, .n = form->n_params};
+        for (uint32_t i = 0; i < policy.n; i++)
+        {
+            policy.theta[i] = 0.5f * (form->params[i].lo + form->params[i].hi);
+        }
+        policy.id.crc = ivl_policy_crc(&policy);
+        TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_check(&ivl_app.cfg, &policy));
+        const uint8_t last = (uint8_t)(ivl_parts_count(policy.n) - 1u);
+        const int     n_sent = sdk.n_sent;
+        for (uint8_t part = 0; part < last; part++)
+        {
+            const ivl_wire_policy_t packet = packet_of(&policy, part);
+            uint8_t                 bytes[IVL_WIRE_SIZE_MAX];
+            handle(bytes, ivl_wire_put_policy(bytes, &packet));
+        }
+        TEST_ASSERT_EQUAL_INT(n_sent, sdk.n_sent);  // the last part alone is answered
+        const ivl_wire_policy_t      packet = packet_of(&policy, last);
+        const ivl_wire_policy_echo_t echo = send_part(&packet);
+        TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, echo.status);
+        TEST_ASSERT_EQUAL_UINT8(number, echo.form_in_force);
+        TEST_ASSERT_EQUAL_MEMORY(&policy, &ivl_app.state.policy, sizeof policy);
+    }
+#ifdef IVL_FORMS_FILE
+    TEST_ASSERT_GREATER_THAN_UINT32(1, number);
+#endif
+}
+
 static void test_policy_after_the_trigger_is_refused(void)
 {
     start_ready();
@@ -928,6 +962,7 @@ int main(void)
     RUN_TEST(test_nothing_arms_before_a_configuration_is_in_force);
     RUN_TEST(test_policy_is_echoed_as_it_is_in_force);
     RUN_TEST(test_policy_with_a_wrong_checksum_or_form_is_refused);
+    RUN_TEST(test_policy_of_every_form_is_taken_in_parts);
     RUN_TEST(test_policy_after_the_trigger_is_refused);
     RUN_TEST(test_packets_are_answered_and_not_kept_when_another_controller_is_selected);
     RUN_TEST(test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat);

@@ -1,20 +1,14 @@
 /// @file test_sim_reading.c
 /// Camera, ranging and flow sensor of the world, low-passes of the autopilot, dead reckoning.
-#include "sim_fixture.h"
-#include "world_sensors.h"
+#include "sensors_fixture.h"
 
 static const ivl_sim_rng_t RNG = {7, 8};
-static ivl_sim_sensors_t   sensors;
 
 /// Body 1 m below the ceiling at t = 0, z = 2 t + 1.5 t^2, x = t.
 static ivl_sim_kin_t moving(const ivl_sim_model_t *model, double t)
 {
-    const double z = model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m - 1.0;
-    return (ivl_sim_kin_t){
-        .p_WB_m = {t, 0.0, z + 2.0 * t + 1.5 * t * t}, .v_WB_mps = {1.0, 0.0, 2.0 + 3.0 * t}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
+    return accelerated(model->raw.world_ceiling_height_m + model->raw.world_sensed_gap_offset_m - 1.0, t);
 }
-
-static const double A_MOVING[3] = {0.0, 0.0, 3.0};
 
 static void begin(const ivl_sim_model_t *model)
 {
@@ -22,19 +16,10 @@ static void begin(const ivl_sim_model_t *model)
     ivl_sim_sensors_init(model, &RNG, &kin, &sensors);
 }
 
-static void look(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, const double a_W_mps2[3], double t, ivl_in_t *in)
-{
-    const ivl_sim_scene_t scene = {.model = model,
-                                   .kin = kin,
-                                   .surface_height_m = ivl_sim_surface_height(&model->surface, 0.0),
-                                   .a_W_mps2 = {a_W_mps2[0], a_W_mps2[1], a_W_mps2[2]}};
-    ivl_sim_sensors_read(&scene, &RNG, t, &sensors, in);
-}
-
 static void read_at(const ivl_sim_model_t *model, double t, ivl_in_t *in)
 {
     const ivl_sim_kin_t kin = moving(model, t);
-    look(model, &kin, A_MOVING, t, in);
+    look(model, &RNG, &kin, A_MOVING, t, in);
 }
 
 static void test_readings_are_the_truth_of_their_instant_and_arrive_after_their_delay(void)
@@ -104,7 +89,7 @@ static void test_noise_offset_rounding_limits_and_losses(void)
     ivl_in_t in = {.t_us = 0};
     for (int tick = 1; tick <= 20000; tick++)
     {
-        look(&model, &kin, still, 0.002 * tick, &in);
+        look(&model, &RNG, &kin, still, 0.002 * tick, &in);
         if (in.range.valid == 0)
         {
             n_invalid++;
@@ -197,7 +182,7 @@ static void test_the_noise_of_a_camera_has_a_constant_part_and_one_of_the_value(
     }
     for (int tick = 0; tick < n; tick++)
     {
-        look(&model, &kin, still, 0.002 * tick, &in);
+        look(&model, &RNG, &kin, still, 0.002 * tick, &in);
         rrev += ((double)in.rrev.value - 2.0) * ((double)in.rrev.value - 2.0);
         flow += ((double)in.flow.value + 1.0) * ((double)in.flow.value + 1.0);
     }
@@ -272,7 +257,7 @@ static void test_an_attitude_from_a_clipped_gyro_lags_behind(void)
     for (int tick = 0; tick <= 25; tick++)
     {
         nose_up(50.0 * 0.002 * tick, kin.q_WB);
-        look(&model, &kin, A_MOVING, 0.002 * tick, &in);
+        look(&model, &RNG, &kin, A_MOVING, 0.002 * tick, &in);
     }
     const double turned = 2.0 * atan2(fabs((double)in.q_WB.y), (double)in.q_WB.w);
     TEST_ASSERT_DOUBLE_WITHIN(0.03, 34.9 * 0.05 + 15.1 * 0.001, turned);

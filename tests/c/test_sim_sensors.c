@@ -1,36 +1,15 @@
 /// @file test_sim_sensors.c
 /// What the flight core is told: when samples are taken and delivered, how noisy they are, what an accelerometer feels.
-#include "world_sensors.h"
-
-#include "sim_fixture.h"
+#include "sensors_fixture.h"
 
 static const double        A_NONE[3] = {0.0, 0.0, 0.0};
 static const ivl_sim_rng_t RNG = {5, 6};
 
-static ivl_sim_sensors_t sensors;
-
-/// A vehicle in uniformly accelerated motion: x = t, z = 2 t + 1.5 t^2.
-static ivl_sim_kin_t moving(double t)
-{
-    return (ivl_sim_kin_t){.p_WB_m = {t, 0.0, 2.0 * t + 1.5 * t * t}, .v_WB_mps = {1.0, 0.0, 2.0 + 3.0 * t}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
-}
-
-static const double A_MOVING[3] = {0.0, 0.0, 3.0};
-
-static void look(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin, const double a_W_mps2[3], double t, ivl_in_t *in)
-{
-    const ivl_sim_scene_t scene = {.model = model,
-                                   .kin = kin,
-                                   .surface_height_m = ivl_sim_surface_height(&model->surface, 0.0),
-                                   .a_W_mps2 = {a_W_mps2[0], a_W_mps2[1], a_W_mps2[2]}};
-    ivl_sim_sensors_read(&scene, &RNG, t, &sensors, in);
-}
-
 static ivl_in_t read_at(const ivl_sim_model_t *model, double t)
 {
-    const ivl_sim_kin_t kin = moving(t);
+    const ivl_sim_kin_t kin = accelerated(0.0, t);
     ivl_in_t            in = {.t_us = 0};
-    look(model, &kin, A_MOVING, t, &in);
+    look(model, &RNG, &kin, A_MOVING, t, &in);
     return in;
 }
 
@@ -45,7 +24,7 @@ static ivl_sim_model_t model_with(double rate_hz, double latency_s, double phase
 
 static void begin(const ivl_sim_model_t *model, const ivl_sim_rng_t *rng)
 {
-    const ivl_sim_kin_t kin = moving(0.0);
+    const ivl_sim_kin_t kin = accelerated(0.0, 0.0);
     ivl_sim_sensors_init(model, rng, &kin, &sensors);
 }
 
@@ -207,7 +186,7 @@ static void test_noise_has_the_stated_deviation_on_every_reading(void)
     for (int tick = 0; tick < 10000; tick++)
     {
         ivl_in_t in = {.t_us = 0};
-        look(&model, &kin, A_NONE, 0.002 * tick, &in);
+        look(&model, &RNG, &kin, A_NONE, 0.002 * tick, &in);
         // the position of a sample is that of its instant: the present one less the motion since
         const double age = 0.002 * tick - pose_time(&in);
         note(&p, (double)in.p_WB_m.y - (2.0 + 0.5 * age));
@@ -236,7 +215,7 @@ static void test_readings_are_the_truth_when_there_is_no_noise(void)
     ivl_in_t              in = {.t_us = 0};
     draw_quat(&draws, kin.q_WB);
     ivl_sim_sensors_init(&model, &RNG, &kin, &sensors);
-    look(&model, &kin, A_NONE, 0.0, &in);
+    look(&model, &RNG, &kin, A_NONE, 0.0, &in);
     TEST_ASSERT_EQUAL_FLOAT((float)kin.q_WB[0], in.q_WB.x);
     TEST_ASSERT_EQUAL_FLOAT((float)kin.q_WB[3], in.q_WB.w);
     TEST_ASSERT_EQUAL_FLOAT(-2.0f, in.w_B_radps.y);
@@ -253,9 +232,9 @@ static void test_readings_clip_at_full_scale(void)
     ivl_sim_kin_t         kin = {.w_B_radps = {50.0, -50.0, 34.0}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
     ivl_in_t              in = {.t_us = 0};
     ivl_sim_sensors_init(&model, &RNG, &kin, &sensors);
-    look(&model, &kin, A_NONE, 0.0, &in);
+    look(&model, &RNG, &kin, A_NONE, 0.0, &in);
     kin.v_WB_mps[0] = -1.0;  // within one tick: 500 m/s^2
-    look(&model, &kin, A_NONE, 0.002, &in);
+    look(&model, &RNG, &kin, A_NONE, 0.002, &in);
     TEST_ASSERT_EQUAL_FLOAT(34.9f, in.w_B_radps.x);
     TEST_ASSERT_EQUAL_FLOAT(-34.9f, in.w_B_radps.y);
     TEST_ASSERT_EQUAL_FLOAT(34.0f, in.w_B_radps.z);
@@ -272,9 +251,9 @@ static ivl_in_t feel(const double q[4], const double dv_mps[3])
     ivl_in_t              in = {.t_us = 0};
     memcpy(kin.q_WB, q, sizeof kin.q_WB);
     ivl_sim_sensors_init(&model, &RNG, &kin, &sensors);
-    look(&model, &kin, A_NONE, 0.0, &in);
+    look(&model, &RNG, &kin, A_NONE, 0.0, &in);
     memcpy(kin.v_WB_mps, dv_mps, sizeof kin.v_WB_mps);
-    look(&model, &kin, A_NONE, 0.002, &in);
+    look(&model, &RNG, &kin, A_NONE, 0.002, &in);
     return in;
 }
 

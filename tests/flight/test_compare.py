@@ -1,5 +1,6 @@
 """Comparison of recorded flights with the simulation: figures with known answers, and the command."""
 
+import importlib
 import json
 from pathlib import Path
 
@@ -9,7 +10,9 @@ from recorded import folder, landing
 
 from ivl import World, cli
 from ivl.errors import ConfigError
+from ivl.experiment import load
 from ivl.flight import compare, store
+from ivl.sensing import ESTIMATORS
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +30,7 @@ def made(flights: store.Flights, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 
 def test_the_vehicle_that_flew_explains_its_flights(flights: store.Flights) -> None:
-    figures = compare.compare(flights, "crazyflie21", "wide_short", "table1", n=48).summary()
+    figures = compare.compare(flights, World("crazyflie21", "wide_short", "table1"), n=48).summary()
     assert figures["n_flights"] == len(flights)
     assert figures["pitch_rms_deg"] < 3.0
     assert figures["height_rms_m"] < 0.015
@@ -38,12 +41,12 @@ def test_the_vehicle_that_flew_explains_its_flights(flights: store.Flights) -> N
 
 
 def test_another_vehicle_does_not(flights: store.Flights) -> None:
-    figures = compare.compare(flights, "habas2021", "wide_short", "table1", n=16).summary()
+    figures = compare.compare(flights, World("habas2021", "wide_short", "table1"), n=16).summary()
     assert figures["pitch_rms_deg"] > 8.0
 
 
 def test_windows_span_where_half_of_the_landings_succeed(flights: store.Flights) -> None:
-    result = compare.compare(flights, "crazyflie21", "wide_short", "table1", n=4, policies=[(3.85, 6.0)])
+    result = compare.compare(flights, World("crazyflie21", "wide_short", "table1"), n=4, policies=[(3.85, 6.0)])
     (window,) = result.windows
     assert len(window.flown) == len(flights)
     low, high = window.span() or (np.nan, np.nan)
@@ -77,16 +80,16 @@ def test_classes_of_endings(legs: float, expected: int | None) -> None:
 def test_flights_that_cannot_be_compared_are_named(flights: store.Flights) -> None:
     world = World("crazyflie21", "wide_short", "table1", None, **{"sense.phase_random": 0.0})
     broken = landing(world, 3.85, 6.0, 99, usable=False, note="it hit the net")
-    result = compare.compare(folder(flights[3], broken), "crazyflie21", "wide_short", "table1", n=2)
+    result = compare.compare(folder(flights[3], broken), World("crazyflie21", "wide_short", "table1"), n=2)
     assert result.left_out == ("flight made-99: not usable: it hit the net",)
     with pytest.raises(ConfigError, match="it hit the net"):
-        compare.compare(folder(broken), "crazyflie21", "wide_short", "table1", n=2)
+        compare.compare(folder(broken), World("crazyflie21", "wide_short", "table1"), n=2)
 
 
 @pytest.mark.parametrize("change", [{"h_plane_m": 1.0}, {"moment_Nmm": 1e3}])
 def test_a_flight_that_cannot_be_flown_is_left_out_and_named(flights: store.Flights, change: dict[str, float]) -> None:
     wrong = store.Flight({**flights[0].info, **change, "label": "wrong"}, flights[0].samples)
-    result = compare.compare(folder(flights[3], wrong), "crazyflie21", "wide_short", "table1", n=2)
+    result = compare.compare(folder(flights[3], wrong), World("crazyflie21", "wide_short", "table1"), n=2)
     assert len(result.rows) == 1
     assert "flight wrong: " in result.left_out[0]
 
@@ -109,13 +112,43 @@ def test_windows_are_flown_under_the_ceiling_of_the_flights(flights: store.Fligh
     spans = []
     for gap_m in (0.0, 0.06):
         room = folder(*(store.Flight({**f.info, "h_surface_m": f.info["h_plane_m"] - gap_m}, f.samples) for f in few))
-        spans.append(compare.compare(room, "crazyflie21", "wide_short", "table1", n=2).windows[0].rate)
+        spans.append(compare.compare(room, World("crazyflie21", "wide_short", "table1"), n=2).windows[0].rate)
     assert np.abs(spans[0] - spans[1]).max() > 0.3
+
+
+@pytest.mark.parametrize("command", ["compare", "identify", "replay"])
+def test_flights_are_held_against_the_world_that_the_common_options_say(
+    command: str, made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[World] = []
+
+    def stop(_flights: object, home: World, *_: object, **__: object) -> None:
+        seen.append(home)
+        raise ConfigError("enough")
+
+    monkeypatch.setattr(importlib.import_module(f"ivl.flight.{command}"), command, stop)
+    own = ["--fit", "rotor.tau_down", "--out", str(tmp_path / "a.yaml")] if command == "identify" else []
+    words = ["flight", command, str(made), *own]
+    experiment = "experiments/paper_vertical.yaml"
+    for options in (
+        [], ["--gear", "wide_long", "--set", "sense.latency=0.02"],
+        ["--set", "estimator=kalman", "--set", "gear=wide_long"],
+        ["--experiment", experiment], ["--experiment", experiment, "--vehicle", "crazyflie21"],
+    ):  # fmt: skip
+        assert cli.run([*words, *options]) == 2
+    plain, changed, by_set, learned, other = seen
+    assert repr(plain) == repr(World("crazyflie21", "wide_short", "table1"))
+    assert repr(changed) == repr(World("crazyflie21", "wide_long", "table1", **{"sense.latency": 0.02}))
+    assert (by_set.gear, by_set.overrides) == ("wide_long", dict(ESTIMATORS["kalman"]))
+    assert repr(learned) == repr(load(experiment).make_world())
+    assert (other.vehicle, other.gear_set) == ("crazyflie21", learned.gear_set)
 
 
 def test_equal_seeds_give_equal_figures(flights: store.Flights) -> None:
     first, second = (
-        compare.compare(folder(*flights.flights[:3]), "crazyflie21", "wide_short", "table1", n=8, seed=5).summary()
+        compare.compare(
+            folder(*flights.flights[:3]), World("crazyflie21", "wide_short", "table1"), n=8, seed=5
+        ).summary()
         for _ in range(2)
     )
     assert json.dumps(first) == json.dumps(second)

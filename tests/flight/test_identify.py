@@ -24,7 +24,7 @@ def flights() -> store.Flights:
 @pytest.fixture(scope="module")
 def found(flights: store.Flights) -> identify.Identification:
     sigmas = {"rotor.tau_down": 0.05, "sense.latency": 0.01, "world.sensed_gap_offset": 0.02}
-    return identify.identify(flights, "crazyflie21", "wide_short", "table1", list(TRUE), sigmas=sigmas)
+    return identify.identify(flights, World("crazyflie21", "wide_short", "table1"), list(TRUE), sigmas=sigmas)
 
 
 def test_known_numbers_are_found(found: identify.Identification) -> None:
@@ -45,12 +45,12 @@ def test_intervals_are_centred_on_the_estimates(found: identify.Identification) 
 def test_what_the_flights_do_not_see_is_not_fitted(flights: store.Flights) -> None:
     few = folder(*flights.flights[:2])
     with pytest.raises(ConfigError, match=r"plate\.friction: the motion of these flights does not depend on it"):
-        identify.identify(few, "crazyflie21", "wide_short", "table1", ["plate.friction"])
+        identify.identify(few, World("crazyflie21", "wide_short", "table1"), ["plate.friction"])
 
 
 def test_one_flight_tells_no_less_than_the_vehicle_file_and_nothing_impossible(flights: store.Flights) -> None:
     names = ["rotor.tau_down", "sense.latency"]
-    result = identify.identify(folder(flights[0]), "crazyflie21", "wide_short", "table1", names)
+    result = identify.identify(folder(flights[0]), World("crazyflie21", "wide_short", "table1"), names)
     for estimate in result.estimates:
         low, high = estimate.interval
         assert estimate.prior.lo <= low <= estimate.value <= high <= estimate.prior.hi
@@ -62,13 +62,14 @@ def test_what_the_flights_measured_is_not_fitted(flights: store.Flights) -> None
         *(store.Flight({**f.info, "h_surface_m": f.info["h_plane_m"] - 0.03}, f.samples) for f in flights)
     )
     with pytest.raises(ConfigError, match="these flights measured it"):
-        identify.identify(measured, "crazyflie21", "wide_short", "table1", ["world.sensed_gap_offset"])
+        identify.identify(measured, World("crazyflie21", "wide_short", "table1"), ["world.sensed_gap_offset"])
 
 
 def test_what_was_held_is_in_the_vehicle_that_is_written(flights: store.Flights) -> None:
     few = folder(*flights.flights[:3])
     held = {"sense.latency": 0.02, "leg.stiffness": 0.1}
-    result = identify.identify(few, "crazyflie21", "wide_short", "table1", ["rotor.tau_down"], held)
+    home = World("crazyflie21", "wide_short", "table1", **held)
+    result = identify.identify(few, home, ["rotor.tau_down"])
     content = identify.vehicle_file("crazyflie21", result, "test")
     assert content["sense"]["latency"]["value"] == 0.02
     assert "leg" not in content
@@ -79,13 +80,13 @@ def test_outcomes_are_not_looked_at(flights: store.Flights, found: identify.Iden
         *(store.Flight({**f.info, "n_legs": 4.0 - f.info["n_legs"], "reward": 1e6}, f.samples) for f in flights)
     )
     sigmas = {e.name: e.prior.sigma for e in found.estimates}
-    again = identify.identify(upside_down, "crazyflie21", "wide_short", "table1", list(TRUE), sigmas=sigmas)
+    again = identify.identify(upside_down, World("crazyflie21", "wide_short", "table1"), list(TRUE), sigmas=sigmas)
     assert again.overrides() == found.overrides()
 
 
 def test_a_sharp_prior_wins_over_flights(flights: store.Flights) -> None:
     sharp = identify.identify(
-        flights, "crazyflie21", "wide_short", "table1", ["rotor.tau_down"], sigmas={"rotor.tau_down": 1e-5}
+        flights, World("crazyflie21", "wide_short", "table1"), ["rotor.tau_down"], sigmas={"rotor.tau_down": 1e-5}
     )
     assert sharp.estimates[0].value == pytest.approx(sharp.estimates[0].prior.value, abs=2e-4)
     assert any("say little of rotor.tau_down" in word for word in sharp.words)
@@ -95,7 +96,7 @@ def test_what_the_flights_cannot_separate_is_said(flights: store.Flights) -> Non
     names = ["body.inertia_yy", "rotor.thrust_gain", "rotor.torque_constant"]
     few = folder(*flights.flights[:2])
     sigmas = {"body.inertia_yy": 5e-6, "rotor.thrust_gain": 0.3, "rotor.torque_constant": 1e-3}
-    result = identify.identify(few, "crazyflie21", "wide_short", "table1", names, sigmas=sigmas)
+    result = identify.identify(few, World("crazyflie21", "wide_short", "table1"), names, sigmas=sigmas)
     text = " ".join(result.words)
     assert "say little of rotor.torque_constant" in text
     assert "Few flights (2)" in text
@@ -103,13 +104,14 @@ def test_what_the_flights_cannot_separate_is_said(flights: store.Flights) -> Non
 
 def test_held_out_flights_are_judged_not_fitted(flights: store.Flights) -> None:
     result = identify.identify(
-        flights, "crazyflie21", "wide_short", "table1", ["rotor.tau_down"], held_out=lambda i, _: i >= 4
+        flights, World("crazyflie21", "wide_short", "table1"), ["rotor.tau_down"], held_out=lambda i, _: i >= 4
     )
     assert result.held_out == ("made-4", "made-5")
     assert len(result.used) == 4
     assert result.after["held_out"]["pitch_rms_deg"] < result.before["held_out"]["pitch_rms_deg"]
+    home = World("crazyflie21", "wide_short", "table1")
     with pytest.raises(ConfigError, match="every one is held out"):
-        identify.identify(flights, "crazyflie21", "wide_short", "table1", ["rotor.tau_down"], held_out=lambda *_: True)
+        identify.identify(flights, home, ["rotor.tau_down"], held_out=lambda *_: True)
 
 
 def test_command_writes_a_vehicle_that_flies(
@@ -143,6 +145,7 @@ def test_command_writes_a_vehicle_that_flies(
     (["--fit", "rotor.tau_down,rotor.tau_down", "--out", "a.yaml"], "named twice"),
     (["--fit", "rotor.tau_down", "--out", "a.txt"], "ends in .yaml"),
     (["--fit", "rotor.tau_down", "--out", "a.yaml", "--set", "rotor.tau_down=0.2"], "also given by --set"),
+    (["--fit", "rotor.tau_down", "--out", "a.yaml", "--set", "sensing=mocap"], "identified with its own sensing"),
     (["--fit", "rotor.tau_down", "--out", "a.yaml", "--sigma", "rotor.tau_down=-1"], "allowed: above 0"),
     (["--fit", "rotor.tau_down", "--out", "a.yaml", "--sigma", "rotor.tau_down=x"], "expected NAME=NUMBER"),
     (["--fit", "rotor.tau_down", "--out", "a.yaml", "--hold-out", "1"], "would hold out every flight"),

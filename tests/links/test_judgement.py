@@ -7,7 +7,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import planes
 import pytest
+from planes import NORMALS
 from rich.console import Console
 
 from ivl import World, native
@@ -36,19 +38,45 @@ def test_pitch_agrees_with_the_simulator_through_a_landing(world: World) -> None
     assert truth.pitch_deg(rows.q_WB) == pytest.approx(rows.pitch_deg, abs=1e-6)
 
 
+def hanging(world: World) -> Resting:
+    """A vehicle that hangs level."""
+    return Resting((0.2, 0.1, world.surface.point_W_m[2] - world.hanging_gap_m()), (0.0, 0.0, -1.0))
+
+
+def leaning(tilt_deg: float) -> tuple[float, float, float]:
+    """The z axis of a body that hangs, but for this tilt."""
+    return (math.sin(math.radians(tilt_deg)), 0.0, -math.cos(math.radians(tilt_deg)))
+
+
 def test_legs_are_suggested_from_height_and_tilt(world: World) -> None:
-    ceiling_m = world.params.values["world.ceiling_height"]
-    gap_m = truth.hanging_gap_m(world)
-    level = Resting(ceiling_m - gap_m, -1.0)
+    level = hanging(world)
     assert truth.suggest_legs(level, world) == 4
-    assert truth.suggest_legs(replace(level, up_z=-math.cos(math.radians(40))), world) == 2
-    assert truth.suggest_legs(replace(level, up_z=0.3), world) == 2
-    assert truth.suggest_legs(Resting(0.03, 1.0), world) == 0
+    assert truth.suggest_legs(replace(level, up_W=leaning(40.0)), world) == 2
+    assert truth.suggest_legs(replace(level, up_W=(0.0, 0.3, 0.95)), world) == 2
+    assert truth.suggest_legs(replace(level, up_W=(math.nan, math.nan, math.nan)), world) == 2
+    assert truth.suggest_legs(Resting((0.0, 0.0, 0.03), (0.0, 0.0, 1.0)), world) == 0
+
+
+@pytest.mark.parametrize("normal", NORMALS)
+def test_legs_are_suggested_at_any_surface(world: World, normal: str) -> None:
+    seen = planes.Seen(world, NORMALS[normal])
+    for tilt_deg, legs in ((0.0, 4), (24.0, 4), (26.0, 2), (170.0, 2)):
+        rests = Resting(seen.point(hanging(world).p_W_m), seen.direction(leaning(tilt_deg)))
+        assert truth.suggest_legs(rests, seen.world) == legs
+    away = Resting(seen.point((0.0, 0.0, 2.0)), seen.direction((0.0, 0.0, -1.0)))
+    assert truth.suggest_legs(away, seen.world) == 0
+
+
+def test_a_resting_pose_is_told_by_position_and_attitude() -> None:
+    hanging_still = Resting.of((1.0, 2.0, 3.0), (0.0, 1.0, 0.0, 0.0))
+    assert hanging_still == Resting((1.0, 2.0, 3.0), (0.0, 0.0, -1.0))
+    assert Resting.of((1.0, 2.0, 3.0), (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))).up_W == pytest.approx((0, -1, 0))
+    assert np.isnan(Resting.of((1.0, 2.0, 3.0), None).up_W).all()
 
 
 def test_hanging_height_is_where_the_simulated_vehicle_comes_to_rest(world: World) -> None:
     rows = world.trace(2.5, 90.0, 4.8, 8.0).rows
-    assert rows.d_ceil_m[-1] == pytest.approx(truth.hanging_gap_m(world), abs=0.02)
+    assert rows.d_ceil_m[-1] == pytest.approx(world.hanging_gap_m(), abs=0.02)
 
 
 def recording_of(world: World, threshold_per_s: float, moment_Nmm: float) -> Recording:
@@ -70,8 +98,8 @@ def test_outcome_of_a_recording_agrees_with_the_simulator(world: World) -> None:
     touch = int(np.argmax(recording.rows["t_s"] >= known.t_impact_s))
     recording.rows["f_B_mps2"][touch] = (0.0, 0.0, -60.0)
     snapshot = Snapshot(1, 0.5, 4.9, 0.0, 0.0, 2.5)
-    rest = recording.rows["p_W_m"][-1, 2]
-    outcome = truth.outcome_of_flight(recording, snapshot, 4, False, Resting(rest, -1.0), world)[0]
+    rest = Resting(tuple(recording.rows["p_W_m"][-1]), (0.0, 0.0, -1.0))
+    outcome = truth.outcome_of_flight(recording, snapshot, 4, False, rest, world)[0]
     assert outcome["t_trigger_s"] == pytest.approx(known.t_trigger_s, abs=0.003)
     assert outcome["t_impact_s"] == pytest.approx(known.t_impact_s, abs=0.003)
     assert outcome["theta_impact_deg"] == pytest.approx(known.theta_impact_deg, abs=5.0)
@@ -82,10 +110,23 @@ def test_outcome_of_a_recording_agrees_with_the_simulator(world: World) -> None:
     assert (outcome["n_legs"], outcome["d_trigger_m"], outcome["rrev_trigger"]) == (4, 0.5, 4.9)
 
 
+@pytest.mark.parametrize("normal", NORMALS)
+def test_the_closest_approach_is_to_the_surface_wherever_it_is(world: World, normal: str) -> None:
+    seen, recording = planes.Seen(world, NORMALS[normal]), recording_of(world, 4.8, 8.0)
+    known = world.trace(2.5, 90.0, 4.8, 8.0).outcome
+    rows = recording.rows.copy()
+    rows["p_W_m"] = seen.points(rows["p_W_m"][:, None], np.zeros(len(rows)))[:, 0]
+    rests = Resting(tuple(rows["p_W_m"][-1]), seen.direction((0.0, 0.0, -1.0)))
+    snapshot = Snapshot(1, 0.5, 4.9, 0.0, 0.0, 2.5)
+    outcome = truth.outcome_of_flight(replace(recording, rows=rows), snapshot, 4, False, rests, seen.world)[0]
+    assert outcome["d_min_m"] == pytest.approx(known.d_min_m, abs=0.003)
+
+
 def test_outcome_without_a_trigger_says_nothing_about_one(world: World) -> None:
     recording = replace(recording_of(world, 4.8, 8.0), trigger_row=None)
     snapshot = Snapshot(9, 0.5, 4.9, 0.0, 0.0, 2.5)
-    outcome = truth.outcome_of_flight(recording, snapshot, 0, False, Resting(0.0, 1.0), world)[0]
+    upright = Resting((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    outcome = truth.outcome_of_flight(recording, snapshot, 0, False, upright, world)[0]
     assert outcome["triggered"] == 0
     assert np.isnan([outcome["t_trigger_s"], outcome["d_trigger_m"], outcome["t_impact_s"]]).all()
 
@@ -112,7 +153,7 @@ class Terminal(Console):
         return self.file.getvalue()
 
 
-RESTING = Resting(2.96, -1.0)
+RESTING = Resting((0.0, 0.0, 2.96), (0.0, 0.0, -1.0))
 
 
 @pytest.mark.parametrize(

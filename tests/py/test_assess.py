@@ -64,6 +64,14 @@ def test_convergence_is_the_first_check_from_which_on_all_are_good(small: Experi
     assert verdicts[4].rate_four_leg == 0.0
 
 
+def test_a_vehicle_that_can_never_land_is_never_solved(small: Experiment, world: ivl.World) -> None:
+    never = Best(GOOD, 0.0, 0.0, 0)
+    for policies in ([BAD] * 4, [GOOD] * 4):
+        (verdict,) = assess.judge(world, small, never, history([policies]), rollouts(1, [0] * 16))
+        assert (verdict.solved, verdict.rollouts_to_convergence, verdict.stuck) == (False, None, False)
+        assert verdict.failed_landings == verdict.failed_landings_total == 16
+
+
 def test_failures_are_counted_up_to_convergence_and_in_all(small: Experiment, world: ivl.World) -> None:
     n_legs = [0, 4, 2, 4, 4, 4, 1, 4, 3, 4, 4, 0, 2, 4, 4, 4]
     body = [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]

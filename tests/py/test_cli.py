@@ -115,9 +115,10 @@ def test_list_names_everything(capsys: Capture) -> None:
     assert "experiments/paper_vertical.yaml" in {entry["name"] for entry in data["experiments"]}
     assert {"ephe", "ephe_robust", "cmaes", "bo"} <= {entry["name"] for entry in data["learners"]}
     assert {entry["name"] for entry in data["rewards"]} == {"paper", "authors_code"}
-    (form,) = data["forms"]
-    assert form["name"] == "constant"
-    assert form["parameters"]["moment_y_Nmm"]["unit"] == "N mm"
+    forms = {entry["name"]: entry["parameters"] for entry in data["forms"]}
+    assert set(forms) == {"constant", "polynomial2", "polynomial3", "bilinear"}
+    assert forms["constant"]["moment_y_Nmm"]["unit"] == "N mm"
+    assert forms["bilinear"]["r_45_per_s"]["unit"] == "1/s"
     assert all(entry["doc"] for entries in data.values() for entry in entries)
 
 

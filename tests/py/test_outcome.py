@@ -1,6 +1,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import ivl
@@ -59,4 +60,14 @@ def test_solved_and_stuck_are_shares_of_what_is_possible() -> None:
     assert outcome.solved(rates, possible=0.75).tolist() == [False, False, False, False, True, True, False]
     assert outcome.stuck(rates, possible=0.75).tolist() == [True, True, True, False, False, False, False]
     assert outcome.solved(rates, possible=0.75, share=0.9).tolist() == [False] * 5 + [True, False]
+    assert outcome.solved(pd.Series(rates), possible=0.75).tolist() == outcome.solved(rates, possible=0.75).tolist()
     assert (bool(outcome.solved(0.8)), bool(outcome.solved(0.79)), bool(outcome.stuck(0.5))) == (True, False, False)
+
+
+@pytest.mark.parametrize("possible", [0.0, np.nan])
+def test_where_no_landing_is_possible_nothing_is_solved(possible: float) -> None:
+    rates = np.array([0.0, 0.5, 1.0, np.nan])
+    assert outcome.solved(rates, possible).tolist() == [False] * 4
+    assert not outcome.solved(0.0, possible)
+    assert outcome.solved(np.zeros(2), np.array([possible, 0.5])).tolist() == [False, False]
+    assert not outcome.stuck(0.0, possible)

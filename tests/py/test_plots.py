@@ -1,14 +1,16 @@
 from pathlib import Path
 
 import numpy as np
+import planes
 import pytest
+from planes import MOVING, NORMALS
 
 import ivl
 from ivl import run
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.plots import convergence, strobe, style
-from ivl.world import rotation
+from ivl.world import Trace, rotation
 
 
 @pytest.fixture
@@ -70,3 +72,30 @@ def test_the_drawn_legs_have_the_length_of_the_legs(world: ivl.World) -> None:
 def test_a_figure_that_cannot_be_written_is_named(tmp_path: Path, name: str) -> None:
     with pytest.raises(ConfigError, match="the figure cannot be written"):
         style.save(style.new_figure(1, 1), [tmp_path / name])
+
+
+def drawn(world: ivl.World, trace: Trace, monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[np.ndarray], list[str]]]:
+    """Lines of each panel as they were drawn, and its labels and texts."""
+    figures = []
+    monkeypatch.setattr(style, "save", lambda figure, paths: figures.append(figure) or list(paths))
+    strobe.draw(world, trace, [])
+    panels = figures[0].axes[:2]
+    words = [[axis.get_xlabel(), axis.get_ylabel(), *(text.get_text() for text in axis.texts)] for axis in panels]
+    return [([line.get_xydata() for line in axis.lines], text) for axis, text in zip(panels, words, strict=True)]
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 0.0), MOVING])
+@pytest.mark.parametrize("normal", NORMALS)
+def test_a_landing_at_any_surface_is_drawn_as_it_is_seen_from_there(
+    world: ivl.World, normal: str, velocity: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = world.trace(2.5, 60.0, 4.8, 8.0)
+    seen = planes.Seen(world, NORMALS[normal], velocity)
+    known = drawn(world, trace, monkeypatch)
+    other = drawn(seen.world, Trace(seen.rows(trace.rows), trace.outcome), monkeypatch)
+    for (lines, _), (again, words) in zip(known, other, strict=True):
+        assert len(again) == len(lines) > 50
+        for line, same in zip(lines, again, strict=True):
+            assert same == pytest.approx(line, abs=1e-9)
+        assert ("g" in words) == (normal != "level")
+        assert ("x (m)" in words) == (normal == "level")

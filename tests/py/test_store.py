@@ -185,9 +185,13 @@ def test_a_folder_with_something_else_is_not_touched(tmp_path: Path) -> None:
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
 
-def test_a_creation_that_was_cut_off_is_started_over(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "left",
+    ["run.sqlite-journal", "run.sqlite-wal", "run.sqlite-shm", "config.yaml", "config.yaml.part", "manifest.json.part"],
+)
+def test_a_creation_that_was_cut_off_is_started_over(tmp_path: Path, left: str) -> None:
     (tmp_path / "run.sqlite").write_bytes(b"half a file")
-    (tmp_path / "config.yaml.part").write_text("a")
+    (tmp_path / left).write_text("a")
     with RunStore.create(tmp_path, "a: 1\n", MANIFEST, DTYPE, LAYOUT) as run:
         assert len(run.rollouts()) == 0
 

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import planes
 import pytest
 from mcap.reader import make_reader
+from planes import MOVING, NORMALS
 
 import ivl
 from ivl import export, landing, tracefile
@@ -20,6 +22,7 @@ from ivl.export import Format, csv_file, flight, mcap_file
 from ivl.export.source import Choice, resolve
 from ivl.landing import LandingSpec
 from ivl.sweep import store
+from ivl.world import rotation
 
 
 @pytest.fixture(scope="module")
@@ -127,6 +130,66 @@ def test_a_number_that_is_none_becomes_null(flown: flight.Flight) -> None:
     broken = flight.Flight("x", columns, flown.phase, flown.world)
     states = [message for _, topic, message in mcap_file.messages(broken) if topic == "/ivl/state"]
     assert {state["rrev_per_s"] for state in states} == {None}
+
+
+# ---- surfaces
+
+
+def at_another_surface(flown: flight.Flight, rows: Any, normal: str, velocity: Any) -> flight.Flight:
+    seen = planes.Seen(flown.world, NORMALS[normal], velocity)
+    return flight.Flight("x", tracefile.columns(seen.rows(rows)), flown.phase, seen.world)
+
+
+def corners_W_m(center: Any, q: Any, size: Any) -> np.ndarray:
+    """Corners of the face of a box that looks against its z axis, and of the one that looks along it."""
+    signs = np.array([[i, j, k] for k in (-1, 1) for i in (-1, 1) for j in (-1, 1)])
+    return np.array(center) + (signs * np.array(size) / 2) @ rotation(np.array(q)).T
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 0.0), MOVING])
+@pytest.mark.parametrize("normal", NORMALS)
+def test_any_surface_is_drawn_where_it_is(
+    flown: flight.Flight, rows: Any, tmp_path: Path, normal: str, velocity: tuple[float, float, float]
+) -> None:
+    other = at_another_surface(flown, rows, normal, velocity)
+    surface = other.world.surface
+    export.write(other, tmp_path / "x.mcap", Format.MCAP)
+    told = messages(tmp_path / "x.mcap", "/ivl/scene")
+    drawn = [(t_ns, e["cubes"][0]) for t_ns, m in told for e in m["entities"] if e["id"] == "ceiling"]
+    assert len(drawn) == (len(rows) if surface.moves else 1)
+    places = []
+    for t_ns, cube in drawn:
+        pose = cube["pose"]
+        box = corners_W_m(*(list(part.values()) for part in (pose["position"], pose["orientation"], cube["size"])))
+        assert surface.gap_m(box[:4], t_ns / 1e9) == pytest.approx(np.zeros(4), abs=1e-8)  # the face towards the room
+        assert surface.gap_m(box[4:], t_ns / 1e9) == pytest.approx(np.full(4, -cube["size"]["z"]), abs=1e-8)
+        places.append(surface.seen(list(pose["position"].values()), t_ns / 1e9))
+    assert np.ptp(places, axis=0) == pytest.approx(np.zeros(3), abs=1e-8)  # it moves as the surface does
+    ends = surface.seen(other.vector("p_WB_m", 3)[-1], other.t_s[-1])
+    assert places[0][:2] == pytest.approx(ends[:2], abs=1e-8)  # and is where the flight ends
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 0.0), MOVING])
+@pytest.mark.parametrize("normal", ["level", "corner"])
+def test_rerun_draws_any_surface_where_it_is(
+    flown: flight.Flight, rows: Any, tmp_path: Path, normal: str, velocity: tuple[float, float, float]
+) -> None:
+    other = at_another_surface(flown, rows, normal, velocity)
+    surface = other.world.surface
+    export.write(other, tmp_path / "x.rrd", Format.RRD)
+    told: dict[str, list[Any]] = {}
+    for batch in rerun_columns(tmp_path / "x.rrd")["/world/ceiling"]:
+        for name in batch.schema.names:
+            told.setdefault(name.rpartition(":")[2], []).extend(batch.column(name).to_pylist())
+    half = np.array(told["half_sizes"][0][0])
+    center, q = np.array(told["centers"][0][0]), np.array(told["quaternions"][0][0])
+    moved = np.array([row[0] for row in told["translation"] if row]) if surface.moves else np.zeros((1, 3))
+    assert ("translation" in told) == surface.moves
+    times = other.t_s if surface.moves else np.zeros(1)
+    assert len(moved) == len(times)
+    for shift, t_s in zip(moved[::37], times[::37], strict=True):
+        box = corners_W_m(center + shift, q, 2 * half)
+        assert surface.gap_m(box, t_s) == pytest.approx(np.repeat([half[2], -half[2]], 4), abs=1e-5)
 
 
 # ---- layouts

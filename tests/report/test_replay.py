@@ -3,14 +3,17 @@
 from typing import Any
 
 import numpy as np
+import planes
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planes import MOVING, NORMALS
 
 import ivl
 from ivl.landing import LandingSpec
 from ivl.report import replay
 from ivl.rewards import RewardChoice
+from ivl.world import Trace
 
 KINDS: dict[str, dict[str, Any]] = {
     "four feet": {"speed_mps": 2.5, "angle_deg": 60.0, "rrev_c_per_s": 4.8, "moment_y_Nmm": 8.0},
@@ -120,3 +123,22 @@ def test_interpolation_is_within_the_tolerance_whatever_the_signal(values: list[
     signal = np.array(values)
     kept = replay.keep_rows(t_s, signal[:, None], np.zeros(len(values), dtype=bool))
     assert np.abs(np.interp(t_s, t_s[kept], signal[kept]) - signal).max() <= 1 + 1e-9
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 0.0), MOVING])
+@pytest.mark.parametrize("normal", NORMALS)
+def test_a_page_shows_any_surface_as_it_shows_a_ceiling(normal: str, velocity: tuple[float, float, float]) -> None:
+    """The same landing under the same plane, seen from another frame, is the same picture to the last digits."""
+    spec = LandingSpec(gear_set="as_simulated", **KINDS["four feet"])
+    world, trace = spec.fly()
+    seen = planes.Seen(world, NORMALS[normal], velocity)
+    other = replay.pack(spec, seen.world, Trace(seen.rows(trace.rows), trace.outcome), RewardChoice())
+    known = Decoded(replay.pack(spec, world, trace, RewardChoice()))
+    again = Decoded(other)
+    for name in ("p", "q", "f", "pitch"):
+        one, two = known.at(name, known.t_s), again.at(name, known.t_s)
+        if name == "q":
+            two *= np.sign(one[0] @ two[0])  # -q is the attitude q
+        error = np.abs(two - one)
+        assert error.max() <= 2.0 * replay.TOLERANCE[name], name
+    assert np.array(other["feet"], dtype=float) == pytest.approx(np.array(known.packed["feet"], dtype=float), abs=2e-4)

@@ -1,6 +1,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from small_sweep import MAP, SMALL, make, write
 
@@ -110,3 +111,18 @@ def test_a_start_that_is_drawn_is_not_varied(tmp_path: Path) -> None:
     drawn = {"rrev_c_per_s": [1.0, 5.0], "moment_y_Nmm": [3.0, 8.0]}
     with pytest.raises(ConfigError, match="mu0_range draws the start of every trial"):
         make(tmp_path, mu0_range=drawn, vary={"policy.rrev_c_per_s.mu0": [3.0, 5.0]})
+
+
+@pytest.mark.parametrize("kind", [int, np.float64, np.float32, np.float16, np.int64, np.uint8, np.longdouble])
+def test_a_seed_follows_from_numbers_whatever_type_they_have(tmp_path: Path, kind: Any) -> None:
+    sweep, chart = make(tmp_path), config.load_map(str(write(tmp_path / "map.yaml", MAP)))
+    assert sweep.key("wide_long", kind(2), kind(60)) == "habas2021|as_simulated|wide_long|2.0|60.0"
+    assert sweep.run_seed("wide_long", kind(2), kind(60), 1) == sweep.run_seed("wide_long", 2.0, 60.0, 1)
+    assert chart.cell_seed("wide_long", kind(2), kind(60)) == chart.cell_seed("wide_long", 2.0, 60.0)
+
+
+def test_seeds_of_fractions_are_those_of_the_same_number(tmp_path: Path) -> None:
+    sweep = make(tmp_path)
+    plain = sweep.run_seed("wide_long", 2.5, 60.0, 0)
+    assert {sweep.run_seed("wide_long", kind(2.5), 60.0, 0) for kind in (np.float64, np.float32, np.float16)} == {plain}
+    assert sweep.run_seed("wide_long", np.float64(2.6), 60.0, 0) == sweep.run_seed("wide_long", 2.6, 60.0, 0)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import yaml
 from small_sweep import MAP, SMALL, fly, make, same_tables, write
 
 from ivl import cli, report
@@ -93,6 +94,17 @@ def test_a_variant_has_the_values_in_its_fields_and_in_its_experiments(tmp_path:
     assert chosen.make_world().params.values == values
     (tmp_path / "again.yaml").write_text(sweep.to_yaml())
     assert config.load_sweep(str(tmp_path / "again.yaml")) == sweep
+
+
+def test_varied_values_of_numpy_mean_the_same_cells(tmp_path: Path) -> None:
+    data = yaml.safe_load(write(tmp_path / "sweep.yaml", SMALL).read_text())
+    given = {"sensing": ["mocap"], "sense.latency": [0.01], "n_rollouts": [6]}
+    numpy = {"sensing": [np.str_("mocap")], "sense.latency": [np.float64(0.01)], "n_rollouts": [np.int64(6)]}
+    one, other = (Sweep.model_validate({**data, "vary": vary}) for vary in (given, numpy))
+    assert other == one
+    keys = [grid.at(each).key(*NAME[:3]) for grid in (one, other) for each in grid.variants()]
+    assert keys[0] == keys[1]
+    assert "numpy" not in other.to_yaml()
 
 
 def test_a_gear_set_that_is_varied_brings_its_own_gears(tmp_path: Path) -> None:

@@ -8,15 +8,24 @@ import typer
 
 from ivl import experiment, outcome
 from ivl.cli import console, policy_options
-from ivl.errors import LinkError
+from ivl.errors import ConfigError, LinkError
+from ivl.experiment import Experiment
+from ivl.links import pil
 from ivl.links.options import Options
 from ivl.mocap import config as mocap_config
+from ivl.policy import use
+from ivl.policy.file import PolicyFile
 from ivl.rewards import TOTAL, RewardChoice
+from ivl.source import Plan
+from ivl.task import Task
+
+_USUAL = "experiments/paper_vertical.yaml"
 
 HELP = """Fly one landing with a vehicle, and print what it latched at the trigger and how it ended.
 
-The approach is that of EXPERIMENT (default: the paper's vertical one). A drone takes off, flies to the start point and
-asks the operator for the outcome; a software vehicle is reset into the air and knows the outcome itself.
+The approach is that of EXPERIMENT (default: the paper's vertical one; with --policy, what the policy was learned on). A
+drone takes off, flies to the start point and asks the operator for the outcome; a software vehicle is reset into the
+air and knows the outcome itself.
 
 \b
 Examples:
@@ -26,17 +35,24 @@ Examples:
       the same as if it were a drone: every question, take-off and all
   ivl fly --uri radio://0/80/2M/E7E7E7E7E7 --rrev 4.8 --moment 8 --csv landing.csv
       the drone; the flight recorder goes into landing.csv
+  ivl fly --uri udp://127.0.0.1:19850 --policy g.yaml --speed 1.2 --angle 35
+      a policy for every approach (ivl policy learn); its vehicle starts with: ivl sil --policy g.yaml
+  ivl fly --uri pil:// --policy g.yaml --speed 1.2 --angle 35
+      the same, every tick decided by an emulated STM32
 """
 
 
 def fly(
-    uri: Annotated[str, typer.Option(help="Link of the vehicle: radio://, usb://, udp://, tcp:// or serial://.")],
+    uri: Annotated[
+        str, typer.Option(help="Link of the vehicle: radio://, usb://, udp://, tcp:// or serial://; or pil://.")
+    ],
     rrev: policy_options.Rrev = None,
     moment: policy_options.Moment = None,
     theta: policy_options.Theta = None,
-    path: Annotated[
-        str, typer.Argument(metavar="[EXPERIMENT]", help="YAML file of the experiment.")
-    ] = "experiments/paper_vertical.yaml",
+    policy_file: policy_options.FileOption = None,
+    path: Annotated[str | None, typer.Argument(metavar="[EXPERIMENT]", help="YAML file of the experiment.")] = None,
+    speed: Annotated[float | None, typer.Option(help=str(Task.model_fields["speed_mps"].description))] = None,
+    angle: Annotated[float | None, typer.Option(help=str(Task.model_fields["angle_deg"].description))] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="A.B=C", help="Change a field of the experiment.")
     ] = None,
@@ -50,8 +66,13 @@ def fly(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Fly one landing; HELP is the text that people see."""
-    chosen = experiment.load(path, settings or [])
-    policy = policy_options.theta_of(chosen.policy.form, theta, rrev, moment)
+    learned = policy_options.load(policy_file, theta=theta, rrev=rrev, moment=moment)
+    chosen = _experiment(learned, path, settings or [], speed_mps=speed, angle_deg=angle)
+    values = learned.values if learned else policy_options.theta_of(chosen.policy.form, theta, rrev, moment)
+    if uri.startswith("pil://"):
+        _refuse(uri, {"--csv": csv, "--mocap": mocap, "--rehearse": rehearse or None})
+        _print(*_fly_chip(uri, chosen, values, seed, stream), as_json)
+        return
     try:
         from ivl.links import crazyflie
         from ivl.links.landing_flight import Rollout
@@ -63,13 +84,49 @@ def fly(
         mocap=tracker, rehearse=rehearse, other_world=True, keep_recordings=csv is not None, say=console.say
     )
     with crazyflie.CrazyflieSource(uri, chosen, options) as source:
-        landing = source.fly_one(Rollout(tuple(policy), seed, stream))
+        landing = source.fly_one(Rollout(tuple(values), seed, stream))
         end_reason = source.world.end_reason(int(landing.outcome["end_reason"][0]))
     if csv is not None and landing.recording is not None:
         csv.write_text(landing.recording.to_csv(), encoding="utf-8")
     result = {"snapshot": _snapshot(landing), "outcome": _outcome(landing.outcome, end_reason)}
+    _print(result, source.warnings, as_json)
+
+
+def _experiment(
+    learned: PolicyFile | None, path: str | None, settings: list[str], **approach: float | None
+) -> Experiment:
+    """What is flown: the experiment that is named, or what the policy was learned on, or the paper's approach."""
+    change = None
+    if learned is not None:
+        change = use.on_its_task(learned) if path is None else use.as_start(learned)
+    return experiment.load(path or _USUAL, settings, change, **approach)
+
+
+def _refuse(uri: str, options: dict[str, Any]) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise ConfigError(f"{name}: {uri} has no vehicle that could do this")
+
+
+def _fly_chip(
+    uri: str, chosen: Experiment, theta: list[float], seed: int, stream: int
+) -> tuple[dict[str, Any], list[str]]:
+    """One landing that an emulated chip decides; its snapshot is that of the outcome."""
+    source = pil.PilSource(uri, chosen, threads=1)
+    plan = Plan(np.array([theta]), np.array([seed], dtype=np.uint64), np.array([stream], dtype=np.uint64))
+    (record,) = (flown.outcomes for flown in source.fly(plan) if len(flown.index))
+    end_reason = source.world.end_reason(int(record["end_reason"][0]))
+    latched = {
+        name: float(record[field][0]) if record["triggered"][0] else None
+        for name, field in (("d_ceil_m", "d_trigger_m"), ("rrev_per_s", "rrev_trigger"), ("of_y_radps", "of_y_trigger"))
+    }
+    snapshot = {"triggered": bool(record["triggered"][0]), **latched}
+    return {"snapshot": snapshot, "outcome": _outcome(record, end_reason)}, source.warnings
+
+
+def _print(result: dict[str, Any], warnings: list[str], as_json: bool) -> None:
     if as_json:
-        console.print_json({**result, "warnings": source.warnings})
+        console.print_json({**result, "warnings": warnings})
         return
     for title, values in result.items():
         console.out.print(title, style="bold")

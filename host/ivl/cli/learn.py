@@ -8,11 +8,12 @@ from typing import Annotated, Any
 import typer
 
 from ivl import experiment, run
-from ivl.cli import console
+from ivl.cli import console, policy_options
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.links.options import Options
 from ivl.mocap import config as mocap_config
+from ivl.policy import use
 
 HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
 
@@ -36,6 +37,8 @@ Examples:
       ivl sil --experiment experiments/paper_vertical.yaml
   ivl learn experiments/paper_vertical.yaml --uri radio://0/80/2M/E7E7E7E7E7 --mocap lab.yaml
       the drone, tracked; see docs/HARDWARE.md and docs/HOST.md first
+  ivl learn experiments/paper_vertical.yaml --policy g.yaml
+      from a policy for every approach on, for this approach
   ivl learn --resume --out runs/mine
       go on after Ctrl-C, kill -9 or power loss
 """
@@ -55,6 +58,9 @@ def learn(
         list[str] | None,
         typer.Option("--set", metavar="A.B=C", help="Change a field of the experiment or a parameter of the world."),
     ] = None,
+    policy_file: Annotated[
+        Path | None, typer.Option("--policy", metavar="FILE", help="Begin the search with the numbers of a policy.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default: a new one under runs/.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was cut off.")] = False,
     uri: Annotated[
@@ -71,7 +77,7 @@ def learn(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
 ) -> None:
     """Learn to land; HELP is the text that people see."""
-    chosen, n_trials = _choose(path, seed, trials, learner, settings or [], out, resume)
+    chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume)
     folder = out or run.default_folder(chosen, n_trials, resume)
     hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage)
     flight = Options(
@@ -105,19 +111,22 @@ def _start_hint(path: str, settings: list[str], uri: str) -> str:
 
 
 def _choose(
-    path: str | None, seed: int | None, trials: int | None, learner: str | None, settings: list[str], out: Path |
-        None, resume: bool
+    path: str | None, seed: int | None, trials: int | None, learner: str | None, settings: list[str],
+    policy_file: Path | None, out: Path | None, resume: bool,
 ) -> tuple[Experiment, int | None]:  # fmt: skip
     """The experiment of the arguments, or the one that the folder to resume holds."""
     if path is not None:
-        return experiment.load(path, settings, seed=seed, learner=learner), trials
+        learned = policy_options.load(policy_file)
+        change = use.as_start(learned) if learned is not None else None
+        return experiment.load(path, settings, change, seed=seed, learner=learner), trials
     if not (resume and out):
         raise ConfigError(
             "EXPERIMENT is missing (only `--resume --out FOLDER` goes without); see: ivl list experiments"
         )
-    if settings or learner or seed is not None or trials is not None:
+    if settings or learner or policy_file or seed is not None or trials is not None:
         raise ConfigError(
-            "--resume without EXPERIMENT takes all from the run folder: leave out --set, --learner, --seed and --trials"
+            "--resume without EXPERIMENT takes all from the run folder: "
+            "leave out --set, --learner, --policy, --seed and --trials"
         )
     return run.read_config(out)
 

@@ -8,6 +8,7 @@ import typer
 from ivl import experiment, forms, model
 from ivl.cli import console
 from ivl.learners import LEARNERS
+from ivl.policy import general
 from ivl.rewards import REWARDS, Reward
 
 HELP = """List vehicles, gears, learners and all other choices.
@@ -65,7 +66,9 @@ def _entries(kind: Kind) -> list[dict[str, Any]]:
     if kind is Kind.GEARS:
         return [_gear(gear_set, name) for gear_set in model.list_gear_sets() for name in model.list_gears(gear_set)]
     if kind is Kind.EXPERIMENTS:
-        return [{"name": path, "doc": experiment.load(path).doc} for path in experiment.list_experiments()]
+        found = {path: experiment.load(path).doc for path in experiment.list_experiments()}
+        found |= {path: f"{general.load([path]).doc} (ivl policy learn)" for path in experiment.list_general()}
+        return [{"name": path, "doc": doc} for path, doc in found.items()]
     if kind is Kind.LEARNERS:
         return [{"name": name, "doc": entry.doc, "options": _options(name)} for name, entry in LEARNERS.items()]
     if kind is Kind.FORMS:

@@ -1,11 +1,14 @@
-"""Options that say a policy: `--theta` for any form, `--rrev` and `--moment` for the paper's."""
+"""Options that say a policy: a file, `--theta` for any form, `--rrev` and `--moment` for the paper's."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from ivl import forms
 from ivl.errors import ArgumentError, ConfigError
+from ivl.policy import file
+from ivl.policy.file import PolicyFile
 
 Rrev = Annotated[
     float | None, typer.Option("--rrev", "--rrev-c", help="Trigger threshold RREV_c of the paper's policy, 1/s.")
@@ -13,10 +16,31 @@ Rrev = Annotated[
 Moment = Annotated[
     float | None, typer.Option(help="Flip moment M_yd of the paper's policy, N mm (magnitude, nose up).")
 ]
-FormName = Annotated[str, typer.Option("--form", help="Form of the policy; see `ivl list forms`.")]
+FormName = Annotated[str | None, typer.Option("--form", help="Form of the policy; see `ivl list forms`.")]
+FileOption = Annotated[
+    Path | None, typer.Option("--policy", metavar="FILE", help="Policy file, as `ivl policy learn` writes one.")
+]
 Theta = Annotated[
     str | None, typer.Option(metavar="A,B,...", help="Parameters of the policy, in the form's order and units.")
 ]
+
+
+def load(path: Path | None, **said: str | float | None) -> PolicyFile | None:
+    """The policy of a file, None if none is named.
+
+    Args:
+        path: The file.
+        **said: Other options that say a policy, by name.
+
+    Raises:
+        ConfigError: The file is wrong, or another option says a policy, too.
+    """
+    if path is None:
+        return None
+    for name, value in said.items():
+        if value is not None:
+            raise ConfigError(f"--policy {path}: already given by --{name}")
+    return file.load(path)
 
 
 def theta_of(name: str, theta: str | None, rrev: float | None, moment: float | None) -> list[float]:

@@ -28,6 +28,8 @@ Examples:
       another vehicle, slower sensing
   ivl rollout --experiment experiments/paper_vertical.yaml --rrev 4.8 --moment 8
       the landing that an experiment learns; without it the legs are those of table1, which were built and flown
+  ivl rollout --policy g.yaml --speed 1.2 --angle 35 --plot landing.png
+      a policy for every approach (ivl policy learn), on what it was learned on, unless other options say otherwise
 """
 
 
@@ -36,8 +38,9 @@ def rollout(
     chosen: Chosen,
     rrev: policy_options.Rrev = None,
     moment: policy_options.Moment = None,
-    form: policy_options.FormName = forms.PAPER,
+    form: policy_options.FormName = None,
     theta: policy_options.Theta = None,
+    policy_file: policy_options.FileOption = None,
     distance: Annotated[float | None, typer.Option(help=f"{LandingSpec.model_fields['d_ceil_m'].description}")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.", min=0)] = 0,
     stream: Annotated[int, typer.Option(help="Number of the rollout within the seed.", min=0)] = 0,
@@ -50,9 +53,15 @@ def rollout(
         tracefile.check_suffix(trace)
     if plot and plot.suffix not in (".png", ".svg", ".pdf"):
         raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
-    policy = {"form": form, "theta": policy_options.theta_of(form, theta, rrev, moment)}
+    learned = policy_options.load(policy_file, form=form, theta=theta, rrev=rrev, moment=moment)
+    name = form or forms.PAPER
+    policy = (
+        {"form": learned.form, "theta": learned.values}
+        if learned is not None
+        else {"form": name, "theta": policy_options.theta_of(name, theta, rrev, moment)}
+    )
     numbers = {"seed": seed, "stream": stream, "d_ceil_m": distance}
-    data = chosen.fields()
+    data = chosen.fields(learned.tasks[0] if learned is not None else None)
     for name in ("speed_mps", "angle_deg"):
         if name not in data:
             raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")

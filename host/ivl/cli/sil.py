@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ivl.cli import console
+from ivl.cli import console, policy_options
 from ivl.cli.task_options import EQUIPMENT, Chosen, task_options
 from ivl.silproc import model_text, server_path
 
@@ -22,6 +22,8 @@ Examples:
       the paper's vehicle in real time
   ivl sil --experiment experiments/paper_vertical.yaml --speed max
       what an experiment flies, as fast as possible
+  ivl sil --policy g.yaml
+      what a policy for every approach was learned on; fly it with: ivl fly --policy g.yaml --uri udp://127.0.0.1:19850
   ivl sil --vehicle crazyflie21 --vehicles 8
       eight vehicles on ports 19850 .. 19857
   ivl sil --lockstep
@@ -36,6 +38,9 @@ Examples:
 @task_options(*EQUIPMENT)
 def sil(
     chosen: Chosen,
+    policy_file: Annotated[
+        Path | None, typer.Option("--policy", metavar="FILE", help="Simulate what a policy was learned on.")
+    ] = None,
     port: Annotated[int, typer.Option(help="UDP port of the first vehicle; 0 takes a free one.")] = 19850,
     bind: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 lets everybody fly.")] = "127.0.0.1",
     vehicles: Annotated[int, typer.Option(help="Number of vehicles, on consecutive ports.")] = 1,
@@ -48,7 +53,8 @@ def sil(
     write_model: Annotated[Path | None, typer.Option(help="Write the parameters to FILE and stop.")] = None,
 ) -> None:
     """Start the software vehicle; HELP is the text that people see."""
-    world = chosen.make_world()
+    learned = policy_options.load(policy_file)
+    world = chosen.make_world(learned.tasks[0] if learned is not None else None)
     text = model_text(world)
     if write_model is not None:
         write_model.write_text(text, encoding="ascii")

@@ -10,7 +10,8 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn
 
 from ivl import run
-from ivl.cli import console
+from ivl.cli import console, policy_options
+from ivl.policy import use
 
 HELP = """Learn over a grid of approaches and landing gears: run a sweep FILE.
 
@@ -30,6 +31,8 @@ Examples:
       parameter of the world can be varied
   ivl sweep sweeps/smoke.yaml --vary sense.latency=0.0,0.01,0.02 --vary gear=wide_short
       one landing gear, three latencies
+  ivl sweep sweeps/smoke.yaml --policy g.yaml --set start=flown --set estimator=known_height_predicted
+      a policy for every approach, as it is, over the grid: landing rates without learning
   ivl sweep sweeps/paper.yaml --out runs/mine --resume
       go on after Ctrl-C, kill -9 or power loss; trials that failed are flown again
   ivl sweep sweeps/paper.yaml --scheduler tcp://10.0.0.1:8786
@@ -80,6 +83,10 @@ def sweep(
     learner: Annotated[str | None, typer.Option(help="Learner by name; see `ivl list learners`.")] = None,
     settings: Settings = None,
     vary: Vary = None,
+    policy_file: Annotated[
+        Path | None,
+        typer.Option("--policy", metavar="FILE", help="Fly this policy as it is; with --learner: begin with it."),
+    ] = None,
     task_size: TaskSize = None,
     dry_run: DryRun = False,
     as_json: AsJson = False,
@@ -87,7 +94,9 @@ def sweep(
     """Run a sweep; HELP is the text that people see."""
     from ivl.sweep import config  # with Arrow and Dask it takes a second to load
 
-    grid = config.load_sweep(path, settings or [], vary or [], learner=learner)
+    learned = policy_options.load(policy_file)
+    change = use.as_it_is(learned, learner) if learned is not None else None
+    grid = config.load_sweep(path, settings or [], vary or [], change, learner=learner)
     base = f"{grid.name}-{grid.gear_set}-{'-'.join(grid.learner_names())}"
     return _run(grid, base, "ivl sweep", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 

@@ -3,16 +3,18 @@
     @task_options("vehicle", "gear", "gear_set")
     def command(chosen: Chosen, ...): ...
 
-The command gets `chosen` with what was said; its help has the texts and defaults of the fields themselves.
+The command gets `chosen` with what was said; its help has the texts and defaults of the fields themselves. A command
+with defaults of its own names them: `@task_options("vehicle", vehicle="crazyflie21")`.
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
 from typing import Annotated, Any, TypeVar
 
 import typer
+from pydantic import BaseModel
 
 from ivl import experiment, yamlfile
 from ivl.errors import ConfigError
@@ -48,14 +50,19 @@ class Chosen:
         given: Fields of the task by name; those of which nothing was said are left out.
         settings: Texts of `--set`.
         path: Experiment that all else changes, if one was named.
+        defaults: Fields that the command starts from without an experiment, where they are not those of the task.
     """
 
     given: dict[str, Any] = field(default_factory=dict)
     settings: list[str] = field(default_factory=list)
     path: str | None = None
+    defaults: Mapping[str, Any] = field(default_factory=dict)
 
-    def fields(self) -> dict[str, Any]:
-        """Fields of the task as raw data: those of the experiment, or the defaults, and what was said.
+    def fields(self, base: BaseModel | None = None) -> dict[str, Any]:
+        """Fields of the task as raw data: those of the experiment, of `base`, or the defaults, and what was said.
+
+        Args:
+            base: What is flown unless an experiment was named; by default the defaults of the task.
 
         Raises:
             ConfigError: The experiment or a setting is wrong, or an option and a setting say the same.
@@ -66,25 +73,31 @@ class Chosen:
                 raise ConfigError(f"--set {setting}: already given by {FLAGS[name][0]}")
         if self.path is not None:
             return experiment.load(self.path, self.settings).task() | self.given
-        data = {name: default_of(name) for name in ("vehicle", "gear")}
+        named = {name: default_of(name) for name in ("vehicle", "gear")} | dict(self.defaults)
+        data = named if base is None else base.model_dump()
         for setting in self.settings:
             apply_setting(data, setting, Task, _LABEL)
         return data | self.given
 
-    def make_world(self) -> World:
-        """The world alone, for commands that are told the approach by somebody else."""
-        data = self.fields()
+    def make_world(self, base: BaseModel | None = None) -> World:
+        """The world alone, for commands that are told the approach by somebody else; `base` as for `fields`."""
+        data = self.fields(base)
         gear = str(data["gear"])
         setup = yamlfile.validate(Setup, {n: v for n, v in data.items() if n in Setup.model_fields}, _LABEL)
         return setup.world_of(gear)
 
 
-def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
-    """Give a command the options of some fields, `--experiment` and `--set`, instead of its parameter `chosen`."""
+def task_options(*names: str, **defaults: Any) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
+    """Give a command the options of some fields, `--experiment` and `--set`, instead of its parameter `chosen`.
+
+    Args:
+        *names: The fields.
+        **defaults: Values of fields where nobody says any, in place of the task's own.
+    """
 
     def give(command: Callable[..., Result]) -> Callable[..., Result]:
         own = inspect.signature(command, eval_str=True)
-        options = [*(_option(name) for name in names), *_general()]
+        options = [*(_option(name, defaults.get(name, default_of(name))) for name in names), *_general()]
         kept = [parameter for parameter in own.parameters.values() if parameter.name != "chosen"]
 
         @wraps(command)
@@ -92,7 +105,7 @@ def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[...,
             said = {name: arguments.pop(name) for name in (*names, "experiment", "settings")}
             path, settings = said.pop("experiment"), said.pop("settings")
             given = {name: value for name, value in said.items() if value is not None}
-            return command(chosen=Chosen(given, settings or [], path), **arguments)
+            return command(chosen=Chosen(given, settings or [], path, defaults), **arguments)
 
         first = [p for p in kept if p.default is inspect.Parameter.empty]
         rest = [p for p in kept if p.default is not inspect.Parameter.empty]
@@ -104,10 +117,9 @@ def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[...,
     return give
 
 
-def _option(name: str) -> inspect.Parameter:
+def _option(name: str, default: Any) -> inspect.Parameter:
     kind = _KINDS.get(name, str)
     text = Task.model_fields[name].description
-    default = default_of(name)
     shown = f"{text}  [default: {default}]" if isinstance(default, str) else text
     return _parameter(name, Annotated[kind | None, typer.Option(*FLAGS[name], help=shown)])
 

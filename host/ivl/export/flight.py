@@ -37,7 +37,7 @@ class Flight:
         title: What it is, in a line.
         columns: Every number by name with its unit, each of shape (n,); the names are those of `ivl rollout --trace`.
         phase: Name of the phase in each row.
-        world: Shapes of the vehicle, and the height of the ceiling.
+        world: Shapes of the vehicle, and the surface.
         facts: What else is known, as text: specification, outcome.
     """
 

@@ -2,7 +2,7 @@
 
     /tf          foxglove.FrameTransforms  body in the world
     /ivl/pose    foxglove.PoseInFrame      the same as a pose
-    /ivl/scene   foxglove.SceneUpdate      ceiling and body once, legs in each row
+    /ivl/scene   foxglove.SceneUpdate      ceiling (again in each row if it moves) and body once, legs in each row
     /ivl/state   ivl.State                 every column of the trace by name, and the phase in words
 
 Time begins at 0 with the landing. Messages are JSON, so that no other library is needed to read them.
@@ -54,6 +54,8 @@ def messages(flight: Flight) -> Iterator[tuple[int, str, scene.Message]]:
     for i, (t_ns, values) in enumerate(zip(times_ns, series, strict=True)):
         yield t_ns, "/tf", scene.transforms(t_ns, position[i], attitude[i])
         yield t_ns, "/ivl/pose", scene.pose(t_ns, position[i], attitude[i])
+        if flight.world.surface.moves and i > 0:
+            yield t_ns, "/ivl/scene", scene.ceiling(flight, t_ns, float(flight.t_s[i]))
         if feet is not None:
             yield t_ns, "/ivl/scene", scene.legs(t_ns, hips[i], feet[i], flight.feet_stuck[i], radius_m)
         numbers = {name: value if math.isfinite(value) else None for name, value in zip(names, values, strict=True)}

@@ -42,9 +42,13 @@ def write(flight: Flight, path: Path) -> None:
         ),
         static=True,
     )
-    middle = [*flight.vector("p_WB_m", 3)[-1, :2], values["world.ceiling_height"]]
-    recording.log("world/ceiling", rr.Boxes3D(sizes=[[1.0, 1.0, 0.002]], centers=[middle]), static=True)
-    times = [rr.TimeColumn(TIMELINE, duration=flight.t_s)]
+    surface, times = flight.world.surface, [rr.TimeColumn(TIMELINE, duration=flight.t_s)]
+    middle = surface.nearest_W_m(flight.vector("p_WB_m", 3)[-1], flight.t_s[-1])
+    ceiling = rr.Boxes3D(sizes=[[1.0, 1.0, 0.002]], centers=[middle], quaternions=[surface.q_WS])
+    recording.log("world/ceiling", ceiling, static=True)
+    if surface.moves:
+        moved = surface.place_W_m(flight.t_s) - surface.place_W_m(flight.t_s[-1])
+        rr.send_columns("world/ceiling", times, rr.Transform3D.columns(translation=moved), recording=recording)
     body = rr.Transform3D.columns(translation=flight.vector("p_WB_m", 3), quaternion=flight.vector("q_WB", 4))
     rr.send_columns("world/body", times, body, recording=recording)
     for name in _series(flight):

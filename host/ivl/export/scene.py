@@ -13,6 +13,8 @@ GREEN, GREY, DARK = (0.0, 0.62, 0.45), (0.35, 0.4, 0.45), (0.3, 0.36, 0.42)
 FRONT, REAR, CEILING = (0.9, 0.62, 0.0), (0.0, 0.45, 0.7), (0.6, 0.65, 0.7)
 _CEILING_SIZE_M, _CEILING_THICK_M, _LEG_THICK_M = 3.0, 0.004, 0.003
 
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+
 Message = dict[str, Any]
 
 
@@ -33,7 +35,7 @@ def pose(t_ns: int, p_m: FloatArray, q: FloatArray) -> Message:
 
 
 def fixed(flight: Flight, t_ns: int) -> Message:
-    """foxglove.SceneUpdate with what does not change: the ceiling, and the body in its own frame."""
+    """foxglove.SceneUpdate with what the flight begins with: the surface, and the body in its own frame."""
     values = flight.world.params.values
     cubes = [
         _cube([0, 0, values[f"{plate}.center_z"]], [values[f"{plate}.size_{a}"] for a in "xyz"], (*colour, alpha))
@@ -44,11 +46,24 @@ def fixed(flight: Flight, t_ns: int) -> Message:
         _cylinder([i * x, j * y, z], [2 * radius, 2 * radius, 0.002], (*(FRONT if i > 0 else REAR), 0.6))
         for i, j in ((1, -1), (-1, -1), (-1, 1), (1, 1))
     ]
-    top = values["world.ceiling_height"] + _CEILING_THICK_M / 2
-    middle = flight.vector("p_WB_m", 3)[-1]
-    ceiling = _cube([middle[0], middle[1], top], [_CEILING_SIZE_M, _CEILING_SIZE_M, _CEILING_THICK_M], (*CEILING, 0.35))
     body = _entity(t_ns, "body", "body", cubes=cubes, cylinders=rotors)
-    return {"deletions": [], "entities": [_entity(t_ns, "ceiling", "world", cubes=[ceiling]), body]}
+    return {"deletions": [], "entities": [_ceiling(flight, t_ns, float(flight.t_s[0])), body]}
+
+
+def ceiling(flight: Flight, t_ns: int, t_s: float) -> Message:
+    """foxglove.SceneUpdate with a surface that has moved on."""
+    return {"deletions": [], "entities": [_ceiling(flight, t_ns, t_s)]}
+
+
+def _ceiling(flight: Flight, t_ns: int, t_s: float) -> Message:
+    """A thin square in the surface, around the place where the flight ends."""
+    surface = flight.world.surface
+    at_end = surface.nearest_W_m(flight.vector("p_WB_m", 3)[-1], flight.t_s[-1])
+    moved = surface.place_W_m(t_s) - surface.place_W_m(flight.t_s[-1])
+    middle = at_end + moved + _CEILING_THICK_M / 2 * np.array(surface.normal_W)
+    size = [_CEILING_SIZE_M, _CEILING_SIZE_M, _CEILING_THICK_M]
+    square = {**_cube(middle, size, (*CEILING, 0.35)), "pose": _at(middle, surface.q_WS)}
+    return _entity(t_ns, "ceiling", "world", cubes=[square])
 
 
 def legs(t_ns: int, hips_m: FloatArray, feet_m: FloatArray, stuck: Any, radius_m: float) -> Message:
@@ -96,8 +111,8 @@ def _cylinder(center: Any, size: Any, colour: tuple[float, ...]) -> Message:
     return {**_cube(center, size, colour), "bottom_scale": 1.0, "top_scale": 1.0}
 
 
-def _at(point: FloatArray) -> Message:
-    return {"position": _xyz(point), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+def _at(point: FloatArray, q: FloatArray = LEVEL) -> Message:
+    return {"position": _xyz(point), "orientation": _xyzw(q)}
 
 
 def _xyz(v: FloatArray) -> Message:

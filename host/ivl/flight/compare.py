@@ -176,10 +176,7 @@ def flips(flights: Flights) -> tuple[list[Flip], list[str]]:
 
 def compare(
     flights: Flights,
-    vehicle: str,
-    gear: str,
-    gear_set: str,
-    overrides: dict[str, float] | None = None,
+    home: World,
     n: int = 64,
     seed: int = 0,
     policies: Sequence[tuple[float, float]] = (),
@@ -190,10 +187,7 @@ def compare(
 
     Args:
         flights: Recorded flights.
-        vehicle: Name or file of the vehicle.
-        gear: Landing gear that was flown.
-        gear_set: Its set.
-        overrides: Parameters to change.
+        home: Vehicle and landing gear to compare with; the flights give the ceiling of their room.
         n: Simulated landings for each flight.
         seed: Of everything random.
         policies: Further policies (RREV_c in 1/s, M_yd in N mm) whose landing rate from hover is wanted.
@@ -201,7 +195,7 @@ def compare(
         progress: Called with the number of flights done and their total.
 
     Raises:
-        ConfigError: No flight can be compared, or a file is wrong.
+        ConfigError: No flight can be compared.
     """
     found, left_out = flips(flights)
     approach = _usual([flip.approach for flip in found if flip.approach is not None])
@@ -209,7 +203,6 @@ def compare(
         raise ConfigError(
             "--policy: the flights do not say their speed and angle: import them with --speed and --angle"
         )
-    home = World(vehicle, gear, gear_set, None, **(overrides or {}))
     found, refused = flyable(home, found)
     left_out += refused
     rng = np.random.default_rng(seed)

@@ -155,11 +155,8 @@ class Identification:
 
 def identify(
     flights: Flights,
-    vehicle: str,
-    gear: str,
-    gear_set: str,
+    home: World,
     names: Sequence[str],
-    overrides: Mapping[str, float] | None = None,
     sigmas: Mapping[str, float] | None = None,
     held_out: Callable[[int, Flip], bool] | None = None,
     seed: int = 0,
@@ -169,32 +166,31 @@ def identify(
 
     Args:
         flights: Recorded flights.
-        vehicle: Name or file of the vehicle to start from.
-        gear: Landing gear that was flown.
-        gear_set: Its set.
+        home: Vehicle to start from and landing gear that was flown; parameters that it overrides are held.
         names: Parameters to fit, by dotted name.
-        overrides: Parameters to change and hold.
         sigmas: Prior standard deviations in place of those of the file.
         held_out: True for a flight (by number and flip) that is not fitted but judged.
         seed: Of the resampling.
         progress: Called with a line after each round.
 
     Raises:
-        ConfigError: A name is unknown or cannot be fitted, a file is wrong, or no flight can be used.
+        ConfigError: A name is unknown or cannot be fitted, or no flight can be used.
     """
-    held = dict(overrides or {})
+    if home.sensing is not None:
+        raise ConfigError(f"sensing: {home.sensing}: a vehicle is identified with its own sensing, which its file has")
+    held = dict(home.overrides)
     _check_sigmas(names, sigmas or {})
-    priors = _priors(vehicle, names, held, sigmas or {})
+    priors = _priors(home.vehicle, names, held, sigmas or {})
     found, left_out = compare.flips(flights)
     _check_site(names, held, found)
-    found, refused = compare.flyable(World(vehicle, gear, gear_set, None, **held), found)
+    found, refused = compare.flyable(home, found)
     left_out += refused
     judged = [held_out is not None and held_out(i, flip) for i, flip in enumerate(found)]
     used = [flip for flip, out in zip(found, judged, strict=True) if not out]
     apart = [flip for flip, out in zip(found, judged, strict=True) if out]
     if not used:
         raise ConfigError("no flight is left to fit: every one is held out")
-    problem = _Problem(vehicle, gear, gear_set, held, dict(zip(names, priors, strict=True)), used)
+    problem = _Problem(home, dict(zip(names, priors, strict=True)), used)
     rng = np.random.default_rng(seed)
     x, spread = problem.solve(rng, progress)
     at, blocks = problem.derivatives(x, spread)
@@ -227,6 +223,7 @@ def _check_site(names: Sequence[str], held: Mapping[str, float], found: Sequence
     """The flights give the ceiling of their room; what they have measured cannot be fitted or held otherwise."""
     measured = any(np.isfinite(flip.h_surface_m) for flip in found)
     for option, asked in (("--fit", names), ("--set", held)):
+        # a recorded number: flights were recorded under level ceilings alone
         if "world.ceiling_height" in asked:
             raise ConfigError(f"{option}: world.ceiling_height: the flights give it (h_plane_m)")
         if measured and "world.sensed_gap_offset" in asked:
@@ -263,10 +260,8 @@ def _no_better(before: Mapping[str, Any], after: Mapping[str, Any]) -> tuple[str
 class _Problem:
     """The fit: residuals of all flights as a function of x, the parameters in units of their prior's scale."""
 
-    def __init__(self, vehicle: str, gear: str, gear_set: str, held: dict[str, float], priors: dict[str, Prior],
-                 flips: list[Flip]) -> None:  # fmt: skip
-        self._home = World(vehicle, gear, gear_set, None, **held)
-        self._held, self._priors, self._flips = held, priors, flips
+    def __init__(self, home: World, priors: dict[str, Prior], flips: list[Flip]) -> None:
+        self._home, self._held, self._priors, self._flips = home, dict(home.overrides), priors, flips
         self._scale = np.array([prior.scale for prior in priors.values()])
         self._center = np.array([prior.value for prior in priors.values()])
         self._n = len(priors)
@@ -420,11 +415,9 @@ class _Rooms:
         return self._worlds[key]
 
     def hanging_m(self, flip: Flip) -> float:
-        """Height at which the vehicle hangs on four feet in the flight's room."""
+        """Height at which the vehicle hangs on four feet in the flight's room, whose ceiling is level."""
         world = self.world(flip)
-        values = world.params.values
-        down_m = -values["leg.hip_z"] + values["leg.length"] * float(np.cos(np.radians(values["leg.angle"])))
-        return values["world.ceiling_height"] - down_m - values["leg.foot_radius"]
+        return world.surface.point_W_m[2] - world.hanging_gap_m()
 
 
 def _residuals(world: World, flip: Flip, rotor_factor: float) -> dict[str, FloatArray]:

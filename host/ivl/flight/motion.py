@@ -147,7 +147,7 @@ def flip(flight: Flight) -> Flip:
 
 
 def site_overrides(flip: Flip, gap_offset_m: float) -> dict[str, float]:
-    """The ceiling of the room in which the flight was flown.
+    """The ceiling of the room in which the flight was flown: level, its height is a recorded number.
 
     Args:
         flip: The recorded flip.

@@ -4,7 +4,7 @@ import numpy as np
 
 from ivl.flight.store import FloatArray
 
-IDLE, READY, APPROACH, FLIP, COAST, ATTACHED, DONE, ABORTED = range(8)
+IDLE, READY, APPROACH, FLIP, COAST, ATTACHED, DONE, ABORTED, LEVEL_OUT = range(9)
 """Numbers of ivl_types.h."""
 _N_MIN, _SPREAD_M = 10, 0.01
 

@@ -13,6 +13,7 @@ from ivl.learners.base import Learner, Options, Result
 from ivl.learners.bo import BOLearner
 from ivl.learners.cma_learner import CMALearner
 from ivl.learners.ephe import EPHE, RobustEPHE
+from ivl.learners.fixed import Fixed
 
 __all__ = [
     "EPHE",
@@ -20,6 +21,7 @@ __all__ = [
     "BOLearner",
     "CMALearner",
     "Entry",
+    "Fixed",
     "Learner",
     "Options",
     "Result",
@@ -50,6 +52,7 @@ LEARNERS: dict[str, Entry] = {
     "ephe_robust": Entry(RobustEPHE, "EPHE with above-mean weights and a limit on how fast sigma may shrink"),
     "cmaes": Entry(CMALearner, "CMA-ES of the cmaes package"),
     "cmaes_lr": Entry(CMALearner, "CMA-ES of the cmaes package with learning-rate adaptation", {"lr_adapt": True}),
+    "fixed": Entry(Fixed, "no search: flies the start again and again, such as a policy of a file"),
     "bo": Entry(BOLearner, "Gaussian process with Thompson sampling: fewest crashes, most computing"),
 }
 

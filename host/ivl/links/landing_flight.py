@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 HEIGHT_M_MIN = 0.3
 _READY_S, _APPROACH_S, _IDLE_S = 5.0, 5.0, 3.0
-_AFTER_READY = (Phase.APPROACH, Phase.FLIP, Phase.COAST, Phase.ATTACHED, Phase.DONE, Phase.ABORTED)
+_AFTER_READY = (
+    Phase.APPROACH, Phase.LEVEL_OUT, Phase.FLIP, Phase.COAST, Phase.ATTACHED, Phase.DONE, Phase.ABORTED,
+)  # fmt: skip
+_LEVEL_OUT_S, _LOOK_S, _STILL_M = 12.0, 0.25, 0.03
 
 Outcome = np.ndarray[Any, np.dtype[np.void]]
 Point = tuple[float, float, float]
@@ -114,6 +117,50 @@ def check_abort(vehicle: Vehicle) -> None:
         raise RolloutError(f"the vehicle aborted: {vehicle.aborted_by}")
 
 
+@dataclass(frozen=True)
+class LevelOut:
+    """How an approach ended that the policy called off.
+
+    Attributes:
+        p_land: Probability of a landing by which it was decided.
+        d_decided_m: Distance that was sensed then.
+        highest_m: Highest point, in W, that the vehicle's logs tell of the time since.
+    """
+
+    p_land: float
+    d_decided_m: float
+    highest_m: float
+
+
+def end_level_out(vehicle: Vehicle) -> LevelOut | None:
+    """After a no-go: wait until the vehicle hovers by itself, ask it to HOVER, and let it land where it is.
+
+    Returns:
+        None if the vehicle aborted instead, which is then in `vehicle.aborted_by`.
+
+    Raises:
+        RolloutError: It did not come to rest.
+        LinkError: The link is gone.
+    """
+    highest_m, still, last = vehicle.position_W_m[2], 0, vehicle.position_W_m
+
+    def hovers() -> bool:
+        nonlocal highest_m, still, last
+        here = vehicle.position_W_m
+        highest_m = max(highest_m, here[2])
+        still = still + 1 if math.dist(here, last) < _STILL_M else 0
+        last = here
+        return still >= 2 or vehicle.phase != Phase.LEVEL_OUT
+
+    vehicle.wait(hovers, _LEVEL_OUT_S, "hover after a no-go", _LOOK_S)
+    if vehicle.phase != Phase.LEVEL_OUT:
+        return None
+    p_land, d_decided_m = vehicle.decision()
+    vehicle.ask_for(Command(Request.HOVER, vehicle.position_W_m), (Phase.READY,), _READY_S)
+    vehicle.come_down()
+    return LevelOut(p_land, d_decided_m, highest_m)
+
+
 def start_point(world: World, experiment: Experiment) -> Point:
     """Where an approach has to begin so that full speed is held before the ceiling, and x = 0 is reached at it.
 
@@ -152,7 +199,7 @@ def make_safe(vehicle: Vehicle) -> str:
         if vehicle.phase in (Phase.FLIP, Phase.COAST):
             vehicle.wait(lambda: vehicle.phase in (Phase.ATTACHED, Phase.DONE), 10.0, "end of the flip")
             done.append("flip completed")
-        if vehicle.phase in (Phase.READY, Phase.APPROACH):
+        if vehicle.phase in (Phase.READY, Phase.APPROACH, Phase.LEVEL_OUT):
             vehicle.ask_for(Command(Request.ABORT), (Phase.ABORTED,), _IDLE_S)
         if vehicle.phase == Phase.ABORTED:
             vehicle.wait(lambda: vehicle.rule in ("landed", "lost"), 60.0, "landing after an abort")

@@ -86,7 +86,7 @@ class ConsoleOperator:
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
         """Ask for legs and body contact, with what the pose suggests as default."""
-        pose = f"rests at {resting.height_m:.3f} m, {'hanging' if resting.up_z < 0 else 'upright'}"
+        pose = f"rests at {resting.p_W_m[2]:.3f} m, {'hanging' if resting.up_W[2] < 0 else 'upright'}"
         self._console.print(f"OUTCOME: {note or 'landing over'}; {pose}.", highlight=False)
         answer = self._ask(
             "legs that hold (d: discard, fly it again)", ["4", "3", "2", "1", "0", "d"], str(suggested.n_legs)

@@ -65,6 +65,7 @@ class Phase(IntEnum):
     ATTACHED = 5
     DONE = 6
     ABORTED = 7
+    LEVEL_OUT = 8
 
 
 STATUS_TEXT = {

@@ -50,8 +50,7 @@ class Tracking:
         state = self.mocap.state()
         if state.pose is None or state.age_s > self.mocap.config.restart_s:
             return None
-        x, y, _, _ = state.pose.q_WB
-        return Resting(state.pose.p_W_m[2], 1.0 - 2.0 * (x * x + y * y))
+        return Resting.of(state.pose.p_W_m, state.pose.q_WB)
 
     def close(self) -> None:
         """End it; again does nothing."""

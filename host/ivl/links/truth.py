@@ -1,15 +1,17 @@
 """The outcome of a landing that was flown in a room: from the flight recorder, the resting pose and a person."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from ivl import native
+from ivl.links.landing_flight import LevelOut
 from ivl.links.packets import Phase, Recording
 from ivl.links.vehicle import Snapshot
-from ivl.world import World
+from ivl.world import World, rotation
 
 _TILT_DEG_MAX, _GAP_M_MAX = 25.0, 0.02
 
@@ -19,25 +21,27 @@ class Resting:
     """Where the vehicle came to rest.
 
     Attributes:
-        height_m: Of the body origin, in W.
-        up_z: Component of the body's z axis along W z: 1 upright, -1 hanging.
+        p_W_m: Position of the body origin, m.
+        up_W: The body's z axis in the world: of a level ceiling, its z is 1 upright and -1 hanging. NaN if unknown.
     """
 
-    height_m: float
-    up_z: float
+    p_W_m: tuple[float, float, float]
+    up_W: tuple[float, float, float]
 
-
-def hanging_gap_m(world: World) -> float:
-    """Distance of the body origin from the ceiling's surface when it hangs on four legs at their rest angle, m."""
-    p = world.params.values
-    return p["leg.length"] * math.cos(math.radians(p["leg.angle"])) + p["leg.foot_radius"] - p["leg.hip_z"]
+    @classmethod
+    def of(cls, p_W_m: Sequence[float], q_WB: Sequence[float] | None) -> Self:
+        """From position and attitude (unit quaternion x, y, z, w; None: unknown)."""
+        x, y, z = (float(v) for v in p_W_m)
+        up = np.full(3, np.nan) if q_WB is None else rotation(np.asarray(q_WB, dtype=np.float64))[:, 2]
+        return cls((x, y, z), (float(up[0]), float(up[1]), float(up[2])))
 
 
 def suggest_legs(resting: Resting, world: World) -> int:
     """Legs that hold, as far as height and tilt tell: 4, 2 (hangs, but tilted or low), or 0 (not at the ceiling)."""
-    gap_m = world.params.values["world.ceiling_height"] - resting.height_m
-    tilt_deg = math.degrees(math.acos(min(max(-resting.up_z, -1.0), 1.0)))
-    level = tilt_deg <= _TILT_DEG_MAX and abs(gap_m - hanging_gap_m(world)) <= _GAP_M_MAX
+    gap_m = float(world.surface.gap_m(resting.p_W_m))
+    away = -float(np.dot(resting.up_W, world.surface.normal_W))  # 1 for a z axis straight out of the surface
+    tilt_deg = math.degrees(math.acos(min(max(away, -1.0), 1.0)))
+    level = tilt_deg <= _TILT_DEG_MAX and abs(gap_m - world.hanging_gap_m()) <= _GAP_M_MAX
     reach_m = world.derived()["reach_m"] + _GAP_M_MAX
     return 4 if level else (2 if gap_m <= reach_m else 0)
 
@@ -47,15 +51,15 @@ def outcome_of_flight(
 ) -> np.ndarray[Any, np.dtype[np.void]]:
     """An outcome record, shape (1,), in the library's layout.
 
-    Times count from the recorder's first row. What a room cannot know (the order of the legs, steps of an integrator)
-    stays 0, and numbers of a contact that was not seen stay NaN.
+    Times count from the recorder's first row. The surface of a room is at rest. What a room cannot know (the order of
+    the legs, steps of an integrator) stays 0, and numbers of a contact that was not seen stay NaN.
     """
     outcome = np.zeros(1, dtype=native.library().outcome_dtype)
     for name in outcome.dtype.names or ():
         if outcome.dtype[name].kind == "f":
             outcome[name] = np.nan
     rows = recording.rows
-    gap_m = world.params.values["world.ceiling_height"] - np.append(rows["p_W_m"][:, 2], resting.height_m)
+    gap_m = world.surface.gap_m(np.vstack([rows["p_W_m"], resting.p_W_m]))
     outcome["n_legs"], outcome["body_contact"] = n_legs, body_contact
     outcome["d_min_m"] = np.min(gap_m)
     outcome["n_ticks"] = len(rows)
@@ -73,6 +77,13 @@ def outcome_of_flight(
         outcome["t_impact_s"] = rows["t_s"][impact]
         outcome["theta_impact_deg"] = pitch_deg(rows["q_WB"])[impact - 1]
     return outcome
+
+
+def note_no_go(outcome: np.ndarray[Any, np.dtype[np.void]], called_off: LevelOut, world: World) -> None:
+    """Write into an outcome of shape (1,) that its approach was called off; the recorder has only the end of it."""
+    outcome["no_go"], outcome["end_reason"] = 1, _end_code("no_go")
+    gap_m = world.params.values["world.ceiling_height"] - called_off.highest_m
+    outcome["d_min_m"] = np.fmin(outcome["d_min_m"], gap_m)
 
 
 def pitch_deg(q_WB: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:

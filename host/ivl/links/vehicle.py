@@ -41,6 +41,7 @@ _PORT_SUPERVISOR, _PORT_HL, _PORT_PLATFORM, _APP = 9, 8, 13, 2
 _ECHO_S, _CALL_S, _WALL_LOOK_S = 2.0, 0.01, 0.01
 _WALL_POLL_S = 0.005
 _LOGS_S = 3.0
+_ABORT_S, _DOWN_S = 3.0, 60.0
 _ON_ITS_WAY = (Status.INCOMPLETE, Status.CRC)
 """What an echo says while the parts of a policy have not all come."""
 _WHOLE_MAX = 4
@@ -160,9 +161,10 @@ class Vehicle:
         self.trigger = LogBlock(
             ("ivl.trg_seq", "ivl.trg_d", "ivl.trg_rrev", "ivl.trg_of_y", "ivl.trg_vx", "ivl.trg_vz"), 50
         )
+        self._decision = LogBlock(("ivl.decided", "ivl.p_decided", "ivl.d_decided"), 50)
         self.config = LogBlock(("ivl.cfg_seq", "ivl.cfg_status", "ivl.cfg_bad", "ivl.cfg_crc"), 100)
         session.listen(_PORT_PLATFORM, _APP, self._on_app)
-        for block in (self.watch, self.state, self.trigger, self.config):
+        for block in (self.watch, self.state, self.trigger, self._decision, self.config):
             session.start_log(block)
         if not self.wait_in_wall_time(lambda: bool(self.watch.values), _LOGS_S):
             raise LinkError(f"{session.uri}: no log variables came within {_LOGS_S:g} s")
@@ -251,6 +253,19 @@ class Vehicle:
         self.abort_reason = reason
         self.command = replace(self.command, request=Request.ABORT)
         self.send_command()
+
+    def come_down(self) -> None:
+        """Land where it hovers after a flight that is over: its landing is that of an abort, but it is none.
+
+        Raises:
+            RolloutError: It did not come down in time.
+            LinkError: The link is gone.
+        """
+        aborted_by = self.aborted_by
+        self.ask_for(Command(Request.ABORT), (Phase.ABORTED,), _ABORT_S)
+        self.wait(lambda: self.rule in ("landed", "lost"), _DOWN_S, "landing after a no-go")
+        self.ask_for(Command(Request.IDLE), (Phase.IDLE,), _ABORT_S)
+        self.aborted_by = aborted_by
 
     def ask_for(self, command: Command, phases: tuple[Phase, ...], limit_s: float) -> Phase:
         """Put a command in force and wait until the vehicle is in one of the phases.
@@ -464,6 +479,13 @@ class Vehicle:
         names = ("ivl.trg_seq", "ivl.trg_d", "ivl.trg_rrev", "ivl.trg_of_y", "ivl.trg_vx", "ivl.trg_vz")
         seq, *rest = (self.trigger.values.get(name, float("nan")) for name in names)
         return Snapshot(int(seq), *(float(value) for value in rest))
+
+    def decision(self) -> tuple[float, float]:
+        """Probability of a landing and sensed distance (m) at which this approach decided go or no-go; NaN before."""
+        values = self._decision.values
+        if not values.get("ivl.decided", 0):
+            return float("nan"), float("nan")
+        return float(values["ivl.p_decided"]), float(values["ivl.d_decided"])
 
     def recording(self, policy_seq: int) -> Recording:
         """Download the flight recorder of the landing that flew a policy (errors as `recorder.download`)."""

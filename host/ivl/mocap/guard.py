@@ -7,7 +7,7 @@ from ivl.errors import RolloutError
 from ivl.links.packets import Phase
 from ivl.mocap.watch import Status
 
-BEFORE_TRIGGER = frozenset((Phase.READY, Phase.APPROACH))
+BEFORE_TRIGGER = frozenset((Phase.READY, Phase.APPROACH, Phase.LEVEL_OUT))
 IN_FLIP = frozenset((Phase.FLIP, Phase.COAST, Phase.ATTACHED))
 AGAIN_S = 0.05
 

@@ -1,6 +1,7 @@
-"""A landing as a strobe picture: side view (x-z) of body, legs, propellers and ceiling at equal time steps.
+"""A landing as a strobe picture: side view of body, legs, propellers and surface at equal time steps.
 
-Left the approach and the flip, until touch-down; right the touch-down and the swing, enlarged and with finer steps.
+The view is along the surface, from the surface's own frame: of a level ceiling, x and z of the world. Left the approach
+and the flip, until touch-down; right the touch-down and the swing, enlarged and with finer steps.
 """
 
 from collections.abc import Sequence
@@ -62,7 +63,7 @@ def draw(world: World, trace: Trace, paths: Sequence[Path]) -> list[Path]:
     first_s, touch_s, last_s = _window(trace)
     _draw_panel(figure, left, world, trace, first_s, touch_s, "approach and flip")
     _draw_panel(figure, right, world, trace, touch_s, last_s, "touch-down and swing")
-    left.set_ylabel("z above the ceiling's surface (m)")
+    left.set_ylabel(_labels(world)[1])
     figure.suptitle(_title(world, trace), fontsize=style.NORMAL)
     for label, time_s, color in _events(trace):
         left.plot([], [], color=color, linewidth=2.2, label=f"{label}, t = {time_s:.3f} s")
@@ -83,13 +84,16 @@ def _draw_panel(
         if first_s <= time_s <= last_s:
             _draw_vehicle(axis, world, _row_at(rows, time_s), color, 2.0)
     path = (rows.t_s >= first_s) & (rows.t_s <= last_s)
-    axis.plot(*_side(world, rows.p_WB_m[path]).T, color=style.GREY, linewidth=0.6, linestyle="--", zorder=0)
+    flown = _side(world, rows.p_WB_m[path], rows.t_s[path])
+    axis.plot(*flown.T, color=style.GREY, linewidth=0.6, linestyle="--", zorder=0)
     axis.axhline(0.0, color="black", linewidth=1.5)
+    if not world.surface.is_level:
+        _draw_gravity(axis, world)
     bar = figure.colorbar(ScalarMappable(scale, color_map), ax=axis, location="bottom", shrink=0.8)
     bar.set_label(f"time (s), a ghost every {1000 * (times[1] - times[0]):.0f} ms", fontsize=style.SMALL)
     bar.ax.tick_params(labelsize=style.SMALL)
     axis.set_aspect("equal", adjustable="datalim")
-    axis.set_xlabel("x (m)")
+    axis.set_xlabel(_labels(world)[0])
     axis.set_title(title, fontsize=style.NORMAL)
     style.finish(axis)
 
@@ -125,20 +129,35 @@ def _draw_vehicle(axis: Axes, world: World, row: Any, color: Any, width: float) 
         ([[0, 0, bottom], [0, 0, top]], 1.2),
     )
     for points_B, line_width in shapes_B:
-        points = _side(world, row.p_WB_m + np.array(points_B) @ to_world.T)
+        points = _side(world, row.p_WB_m + np.array(points_B) @ to_world.T, row.t_s)
         axis.plot(*points.T, color=color, linewidth=line_width * width, solid_capstyle="round")
     feet = row.foot_W_m.reshape(4, 3)
     hips_B = np.column_stack([values["leg.hip_xy"] * _LEG_SIGNS, np.full(4, values["leg.hip_z"])])
     for leg in np.stack([row.p_WB_m + hips_B @ to_world.T, feet], axis=1):
-        axis.plot(*_side(world, leg).T, color=color, linewidth=0.8 * width)
-    side = _side(world, feet)
+        axis.plot(*_side(world, leg, row.t_s).T, color=color, linewidth=0.8 * width)
+    side = _side(world, feet, row.t_s)
     axis.scatter(side[:, 0], side[:, 1], s=5 * width, color=[color], zorder=3)
 
 
-def _side(world: World, points_W_m: FloatArray) -> FloatArray:
-    """Horizontal place, and height above the ceiling's surface, shape (n, 2)."""
-    height_m = world.params.values["world.ceiling_height"]
-    return np.column_stack([points_W_m[..., 0], points_W_m[..., 2] - height_m])
+def _side(world: World, points_W_m: FloatArray, t_s: npt.ArrayLike) -> FloatArray:
+    """Place along the surface, and height above it, shape (n, 2)."""
+    return world.surface.seen(points_W_m, t_s)[..., [0, 2]]
+
+
+def _labels(world: World) -> tuple[str, str]:
+    if world.surface.is_level:
+        return "x (m)", "z above the ceiling's surface (m)"
+    return "along the surface (m)", "above the surface (m)"
+
+
+def _draw_gravity(axis: Axes, world: World) -> None:
+    """An arrow in the direction in which things fall; shorter as far as it points into the picture."""
+    along, _, above = world.surface.axes_W @ [0.0, 0.0, -1.0]
+    axis.annotate(
+        "", (0.12 + 0.1 * along, 0.12 + 0.1 * above), (0.12, 0.12), xycoords="axes fraction",
+        arrowprops={"arrowstyle": "->", "color": style.GREY},
+    )  # fmt: skip
+    axis.text(0.12, 0.12, "g", transform=axis.transAxes, fontsize=style.SMALL, color=style.GREY)
 
 
 def _title(world: World, trace: Trace) -> str:

@@ -1,8 +1,9 @@
 """A landing in few numbers: what the page needs to draw it at any time, and nothing else.
 
 Only the rows are kept that linear interpolation needs to be within the tolerances below, so that rows are rare where
-the motion is plain and dense where it turns: around the trigger and the contacts. Feet are told in body axes, where
-they rest while they are free, and by their place on the ceiling while they are stuck. Numbers are whole multiples of
+the motion is plain and dense where it turns: around the trigger and the contacts. Places and attitudes are told in the
+frame of the surface, so that the page draws any surface as its plane z = 0. Feet are told in body axes, where they rest
+while they are free, and by their place on the surface while they are stuck. Numbers are whole multiples of
 the units of `SCALE`, each column as differences, which is what makes them small once compressed.
 """
 
@@ -113,15 +114,13 @@ def _window(trace: Trace) -> Any:
 
 
 def _signals(world: World, rows: Any) -> dict[str, FloatArray]:
-    """What moves, each of shape (n, columns): position relative to the ceiling, attitude, feet in body axes, pitch."""
-    height_m = world.params.values["world.ceiling_height"]
-    position = rows.p_WB_m - np.array([0.0, 0.0, height_m])
+    """What moves, each of shape (n, columns): position and attitude in S, feet in body axes, pitch."""
     feet_W = rows.foot_W_m.reshape(-1, 4, 3) - rows.p_WB_m[:, None, :]
     feet_B = np.einsum("jin,nlj->nli", rotation(rows.q_WB.T), feet_W)
     feet_B = _held_while_stuck(feet_B, rows["foot_state"] == STUCK)
     return {
-        "p": position,
-        "q": _continuous(rows.q_WB),
+        "p": world.surface.seen(rows.p_WB_m, rows.t_s),
+        "q": _continuous(world.surface.turned(rows.q_WB)),
         "f": feet_B.reshape(len(rows), 12),
         "pitch": rows.pitch_deg[:, None],
     }
@@ -161,9 +160,8 @@ def _integers(values: FloatArray, unit: Any) -> list[list[int]]:
 
 
 def _foot_events(world: World, rows: Any) -> list[list[float]]:
-    """[time, foot 0..3, state, x, y, z] of each change of a foot; the place is relative to the ceiling."""
-    height_m = world.params.values["world.ceiling_height"]
-    places = np.round(rows.foot_W_m.reshape(-1, 4, 3) - [0.0, 0.0, height_m], 4)
+    """[time, foot 0..3, state, x, y, z] of each change of a foot; the place is in S."""
+    places = np.round(world.surface.seen(rows.foot_W_m.reshape(-1, 4, 3), rows.t_s[:, None]), 4)
     state = rows["foot_state"]
     before = np.vstack([np.zeros((1, 4), dtype=state.dtype), state[:-1]])
     return [

@@ -13,7 +13,7 @@ from ivl.outcome import Outcomes
 from ivl.quantity import Quantity
 from ivl.rewards import base
 from ivl.rewards.base import Reward, Terms
-from ivl.rewards.parts import angle_points, points_by_legs, touched
+from ivl.rewards.parts import ANGLE, angle_points, points_by_legs, touched
 
 LEGS_FREE = (0.0, 10.0, 50.0, 150.0, 150.0)
 LEGS_TOUCHED = (0.0, 10.0, 25.0, 100.0, 100.0)
@@ -38,7 +38,7 @@ REWARD = Reward(
     doc="The reward of the authors' code.",
     terms=(
         Quantity("height", "1", "10 times the height of the closest approach over that of the ceiling"),
-        Quantity("angle", "1", "10 for a rotation of 90 degrees or more at the first contact, in proportion below"),
+        ANGLE,
         Quantity("legs", "1", "150 for three or four feet, 50 for two, 10 for one; 100, 25 and 10 on body contact"),
     ),
     compute=compute,

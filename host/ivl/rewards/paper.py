@@ -13,7 +13,7 @@ from ivl.outcome import Outcomes
 from ivl.quantity import Quantity
 from ivl.rewards import base
 from ivl.rewards.base import Reward, Terms
-from ivl.rewards.parts import angle_points, points_by_legs, touched
+from ivl.rewards.parts import ANGLE, angle_points, points_by_legs, touched
 
 LEGS = (0.0, 50.0, 50.0, 150.0, 150.0)
 
@@ -40,7 +40,7 @@ REWARD = Reward(
     doc="The paper's reward.",
     terms=(
         Quantity("distance", "1", "one over the smallest distance to the ceiling in metres"),
-        Quantity("angle", "1", "10 for a rotation of 90 degrees or more at the first contact, in proportion below"),
+        ANGLE,
         Quantity("legs", "1", "150 for three or four feet, 50 for one or two, half of it on body contact"),
     ),
     compute=compute,

@@ -6,10 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl.outcome import Outcomes, folded_deg
+from ivl.quantity import Quantity
 from ivl.rewards.base import FloatArray
 
 ANGLE_POINTS, ANGLE_FULL_DEG = 10.0, 90.0
 """Largest angle term, and the rotation from which on it is earned in full."""
+ANGLE = Quantity("angle", "1", "10 for a rotation of 90 degrees or more at the first contact, in proportion below")
+"""What `angle_points` are, in words."""
 
 
 def angle_points(outcomes: Outcomes) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ivl.sweep import cluster, config, engine, folder, plan, schema, store, work
 from ivl.sweep.config import Sweep
-from ivl.sweep.plan import Task
+from ivl.sweep.plan import DaskTask
 from ivl.sweep.work import Done
 
 _SIZE = 32
@@ -99,7 +99,7 @@ def _overhead_s(sweep: Sweep, scratch: Path, n_tasks: int = 200) -> float:
         return (time.monotonic() - began) / n_tasks
 
 
-def _nothing(_sweep: Sweep, _world: bytes, _task: Task, done: Done) -> Done:
+def _nothing(_sweep: Sweep, _world: bytes, _task: DaskTask, done: Done) -> Done:
     return done
 
 

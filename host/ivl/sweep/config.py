@@ -199,7 +199,7 @@ class _Grid(Setup, Named):
         What is flown is part of it as far as it is varied; how it is learned is not, so that learners are compared on
         the same random numbers.
         """
-        name = f"{self.vehicle}|{self.gear_set}|{gear}|{speed_mps!r}|{angle_deg!r}"
+        name = f"{self.vehicle}|{self.gear_set}|{gear}|{float(speed_mps)!r}|{float(angle_deg)!r}"
         for path in sorted(self.vary):
             if path in AXES or path in _SEED_HAS or not is_flown(path):
                 continue
@@ -324,19 +324,26 @@ def list_sweeps() -> list[str]:
     return [f"sweeps/{path.name}" for path in sorted(SWEEPS_DIR.glob("*.yaml"))]
 
 
-def load_sweep(path: str, settings: Sequence[str] = (), vary: Sequence[str] = (), **replacements: Any) -> Sweep:
+def load_sweep(
+    path: str,
+    settings: Sequence[str] = (),
+    vary: Sequence[str] = (),
+    change: Callable[[dict[str, Any]], None] | None = None,
+    **replacements: Any,
+) -> Sweep:
     """Read, change and check a sweep file.
 
     Args:
         path: As for `ivl.experiment.load`.
         settings: Likewise.
         vary: "a.b=x,y" each: values of a path, in place of what the file says of it.
+        change: As for `ivl.experiment.load`.
         **replacements: As for `ivl.experiment.load`.
 
     Raises:
         ConfigError: One line naming file, field and value.
     """
-    sweep = _load(Sweep, Experiment, path, settings, vary, replacements)
+    sweep = _load(Sweep, Experiment, path, settings, vary, replacements, change)
     for varied in sweep.variants():
         grid = sweep.at(varied)
         try:
@@ -357,11 +364,13 @@ def load_map(path: str, settings: Sequence[str] = (), vary: Sequence[str] = (), 
 
 def _load(
     kind: type[Grid], varied: type[BaseModel], path: str, settings: Sequence[str], vary: Sequence[str],
-    replacements: dict[str, Any],
+    replacements: dict[str, Any], change: Callable[[dict[str, Any]], None] | None = None,
 ) -> Grid:  # fmt: skip
     """Read a file; `varied` has the fields that may be varied."""
     file = locate(path, list_sweeps())
     data = read_mapping(file)
+    if change is not None:
+        change(data)
     experiment.replace(data, replacements)
     apply_vary(data, vary, file.name)
     for setting in settings:

@@ -23,7 +23,7 @@ from ivl import native
 from ivl.errors import NativeError, RolloutError
 from ivl.sweep import cluster, folder, plan, schema, store
 from ivl.sweep.config import PolicyMap, Sweep
-from ivl.sweep.plan import Task
+from ivl.sweep.plan import DaskTask
 from ivl.sweep.work import lost, record, run_packed
 from ivl.world import World
 
@@ -128,7 +128,7 @@ class _Session:
         run_folder: Path,
         grid: Sweep | PolicyMap,
         worlds: dict[str, World],
-        tasks: list[Task],
+        tasks: list[DaskTask],
         done: set[int],
         on_standing: Callable[[Standing], None] | None,
     ) -> None:
@@ -148,7 +148,7 @@ class _Session:
         """Keep the cluster busy until every task is back."""
         self._began = time.monotonic()
         self._count_workers(client)
-        tasks: dict[str, Task] = {}
+        tasks: dict[str, DaskTask] = {}
         futures = _dask.as_completed()
         source = iter(self.waiting)
         self._refill(client, futures, tasks, source)
@@ -170,7 +170,7 @@ class _Session:
         self._n_workers = sum(client.nthreads().values())
         self._counted = time.monotonic()
 
-    def _refill(self, client: Any, futures: Any, tasks: dict[str, Task], source: Iterator[Task]) -> None:
+    def _refill(self, client: Any, futures: Any, tasks: dict[str, DaskTask], source: Iterator[DaskTask]) -> None:
         """Hand out tasks until enough of them wait: not all at once, a scheduler's memory is finite too."""
         while len(tasks) < (1 + _AHEAD) * max(self._n_workers, 1) and (task := next(source, None)):
             future = client.submit(
@@ -186,7 +186,7 @@ class _Session:
             tasks[future.key] = task
             futures.add(future)
 
-    def _keep(self, task: Task, future: Any) -> None:
+    def _keep(self, task: DaskTask, future: Any) -> None:
         """Write what came back, whatever it is."""
         if future.cancelled():
             raise RolloutError("the scheduler dropped its tasks; continue with --resume")

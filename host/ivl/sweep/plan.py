@@ -1,4 +1,4 @@
-"""Tasks: which trials are flown together.
+"""Dask tasks: which trials one worker flies together. A task without that word is what is flown (`ivl.task`).
 
 Trials differ in cost up to sevenfold (a slow, flat approach presses its plates along the ceiling for a second), so they
 are dealt to the tasks in a fixed shuffled order: tasks cost about the same, and what is done tells how long the rest
@@ -22,7 +22,7 @@ OVERHEAD_PER_TRIAL = 0.1
 
 
 @dataclass(frozen=True)
-class Task:
+class DaskTask:
     """Some trials (or map cells) of one landing gear and one variant.
 
     Attributes:
@@ -43,16 +43,16 @@ class Task:
         return world_name(self.gear, self.varied)
 
 
-def plan(grid: Sweep | PolicyMap, size: int) -> list[Task]:
+def plan(grid: Sweep | PolicyMap, size: int) -> list[DaskTask]:
     """All tasks, `size` trials each but for the last of a gear and variant; the same for the same arguments, always."""
     n_trials = grid.trials if isinstance(grid, Sweep) else 1
     names = [Trial(speed, angle, k) for speed, angle in grid.approaches() for k in range(n_trials)]
     shuffled = [names[i] for i in np.random.Generator(np.random.PCG64(0)).permutation(len(names))]
-    tasks: list[Task] = []
+    tasks: list[DaskTask] = []
     for varied in grid.variants():
         for gear in grid.at(varied).gear_names():
             for part in _chunks(shuffled, size):
-                tasks.append(Task(len(tasks), gear, tuple(part), varied))
+                tasks.append(DaskTask(len(tasks), gear, tuple(part), varied))
     return tasks
 
 

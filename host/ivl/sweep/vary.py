@@ -33,6 +33,11 @@ class Range(Strict):
 Axis = Annotated[list[Finite], Field(min_length=1, max_length=COUNT_MAX)] | Range
 
 
+def plain(value: Any) -> Any:
+    """A number or text of numpy as Python's own; anything else as it is."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
 def values(axis: list[float] | Range) -> list[float]:
     """The values of an axis, rounded to what a person would have typed."""
     if isinstance(axis, Range):
@@ -81,6 +86,7 @@ def listed(path: str, given: Any) -> list[Any]:
     if not isinstance(given, list) or not given:
         what = "the list is empty" if given == [] else f"value {given!r}"
         raise ValueError(f"{where}: {what}: expected a list of values, or first, last and count")
+    given = [plain(value) for value in given]
     for value in given:
         if not isinstance(value, Value):
             raise ValueError(f"{where}: value {value!r} is no single value")

@@ -18,7 +18,7 @@ from ivl import native
 from ivl.errors import NativeError
 from ivl.sweep import policymap, schema, tables, trials
 from ivl.sweep.config import PolicyMap, Sweep
-from ivl.sweep.plan import Task
+from ivl.sweep.plan import DaskTask
 from ivl.sweep.trials import Trial
 from ivl.sweep.vary import as_cell
 from ivl.world import World
@@ -49,7 +49,7 @@ class Done:
     worker: str
 
 
-def run_packed(grid: Sweep | PolicyMap, packed_world: bytes, task: Task, library_sha256: str) -> Done:
+def run_packed(grid: Sweep | PolicyMap, packed_world: bytes, task: DaskTask, library_sha256: str) -> Done:
     """`run_task` on a worker, with the world pickled: it cannot be unpacked by another native library.
 
     Raises:
@@ -60,7 +60,7 @@ def run_packed(grid: Sweep | PolicyMap, packed_world: bytes, task: Task, library
     return run_task(grid, pickle.loads(packed_world), task)
 
 
-def run_task(grid: Sweep | PolicyMap, world: World, task: Task) -> Done:
+def run_task(grid: Sweep | PolicyMap, world: World, task: DaskTask) -> Done:
     """Fly a task on one thread; trials that raise are reported in `failures`, the others are not touched by it."""
     began, processor = time.monotonic(), time.process_time()
     at = grid.at(task.varied)
@@ -82,7 +82,7 @@ def run_task(grid: Sweep | PolicyMap, world: World, task: Task) -> Done:
     )
 
 
-def lost(grid: Sweep | PolicyMap, task: Task, error: Exception) -> Done:
+def lost(grid: Sweep | PolicyMap, task: DaskTask, error: Exception) -> Done:
     """A task that no worker could finish: all its trials failed."""
     failed = [(trial, error) for trial in task.trials]
     table = tables.failures_table(grid.at(task.varied), task.gear, task.number, failed)
@@ -90,7 +90,7 @@ def lost(grid: Sweep | PolicyMap, task: Task, error: Exception) -> Done:
     return Done(parts, 0, len(failed), 0, 0.0, 0.0, "")
 
 
-def record(task: Task, done: Done) -> bytes:
+def record(task: DaskTask, done: Done) -> bytes:
     """The row of the `tasks` table, as a Parquet file."""
     columns = {
         "task": [task.number],
@@ -105,7 +105,7 @@ def record(task: Task, done: Done) -> bytes:
     return tables.encode(tables.make_table(schema.TASKS, columns))
 
 
-def _with_varied(table: pa.Table, task: Task) -> pa.Table:
+def _with_varied(table: pa.Table, task: DaskTask) -> pa.Table:
     """The table with a column for each varied path that has none of its own."""
     for path, value in task.varied:
         if path not in schema.COLUMN_OF:

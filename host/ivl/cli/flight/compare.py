@@ -8,6 +8,7 @@ from rich.progress import Progress
 
 from ivl.cli import console
 from ivl.cli.flight import options
+from ivl.cli.task_options import Chosen
 from ivl.errors import ConfigError
 from ivl.world import World
 
@@ -30,12 +31,10 @@ Examples:
 _SUFFIXES = (".png", ".svg", ".pdf")
 
 
+@options.world_options
 def compare(
     folder: options.Folder,
-    vehicle: options.Vehicle = options.DEFAULT_VEHICLE,
-    gear: options.Gear = options.DEFAULT_GEAR,
-    gear_set: options.GearSet = options.DEFAULT_GEAR_SET,
-    settings: options.Settings = None,
+    chosen: Chosen,
     policy: Annotated[
         list[str] | None, typer.Option(metavar="RREV_C,M_YD", help="Also give this policy's landing rate, from hover.")
     ] = None,
@@ -52,31 +51,33 @@ def compare(
     if path is not None:
         options.check_parent("--plot", path)
     flights = store.read(folder)
-    changes = options.overrides(settings)
+    home = chosen.make_world()
     with Progress(console=console.err, transient=True) as progress:
         task = progress.add_task("flights", total=None)
         result = library.compare(
-            flights, vehicle, gear, gear_set, changes, rollouts, seed, options.policies(policy),
+            flights, home, rollouts, seed, options.policies(policy),
             progress=lambda done, total: progress.update(task, completed=done, total=total),
         )  # fmt: skip
     summary = result.summary()
     if as_json:
         console.print_json(summary)
     else:
-        _report(summary, f"{vehicle}, {gear_set}/{gear}")
+        _report(summary, _name(home))
     if path is not None:
-        _draw(library, result, (vehicle, gear, gear_set), changes, path)
+        _draw(library, result, home, path)
         if not as_json:
             console.say(f"figure: {path}")
 
 
-def _draw(library: Any, result: Any, made: tuple[str, str, str], changes: dict[str, float], path: Path) -> None:
+def _name(world: World) -> str:
+    return f"{world.vehicle}, {world.gear_set}/{world.gear}"
+
+
+def _draw(library: Any, result: Any, home: World, path: Path) -> None:
     from ivl.plots import flights as picture  # matplotlib takes a second to load
 
-    vehicle, gear, gear_set = made
-    home = World(vehicle, gear, gear_set, None, **changes)
     worlds = [library.in_room(home, row.flip) for row in result.rows]
-    picture.draw(result, worlds, [path], f"{made[0]}, {made[2]}/{made[1]}")
+    picture.draw(result, worlds, [path], _name(home))
 
 
 def _report(summary: dict[str, Any], name: str) -> None:

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from ivl.cli import console
 from ivl.cli.flight import options
+from ivl.cli.task_options import Chosen
 from ivl.errors import ConfigError
 
 HELP = """Identify a vehicle from the motion of recorded flights, and write it as a vehicle file.
@@ -16,6 +17,7 @@ HELP = """Identify a vehicle from the motion of recorded flights, and write it a
 The fit looks at pitch, rate and height after the trigger, at the time of the contact and at the height at which the
 vehicle hung: never at whether it landed. The vehicle file gives the prior (value and sigma of each fitted parameter),
 the parameter table the bounds. Intervals come from resampling whole flights. It names what the flights cannot separate.
+What differs from the vehicle's file (--set) is held, and goes into the new file.
 
 \b
 Examples:
@@ -30,14 +32,12 @@ Examples:
 """
 
 
+@options.world_options
 def identify(
     folder: options.Folder,
+    chosen: Chosen,
     fit: Annotated[str, typer.Option(metavar="A.B,C.D", help="Parameters to fit, by dotted name.")],
     out: Annotated[Path, typer.Option(help="Vehicle file to write.")],
-    vehicle: options.Vehicle = options.DEFAULT_VEHICLE,
-    gear: options.Gear = options.DEFAULT_GEAR,
-    gear_set: options.GearSet = options.DEFAULT_GEAR_SET,
-    settings: options.Settings = None,
     sigma: Annotated[
         list[str] | None, typer.Option(metavar="A.B=C", help="Prior standard deviation in place of the file's.")
     ] = None,
@@ -61,14 +61,14 @@ def identify(
         raise ConfigError("--hold-out 1: would hold out every flight (allowed 0, or 2 and more)")
     options.check_parent("--out", out)
     low, high = _range(hold_out_moment)
-    flights = store.read(folder)
+    home, flights = chosen.make_world(), store.read(folder)
     sigmas = {text.partition("=")[0]: _number(text) for text in sigma or []}
     result = library.identify(
-        flights, vehicle, gear, gear_set, names, options.overrides(settings), sigmas,
+        flights, home, names, sigmas,
         lambda i, flip: (hold_out > 0 and i % hold_out == hold_out - 1) or low <= flip.moment_Nmm <= high,
         seed, None if as_json else console.say,
     )  # fmt: skip
-    _write(out, library.vehicle_file(vehicle, result, _source(flights, result)))
+    _write(out, library.vehicle_file(home.vehicle, result, _source(flights, result)))
     summary = result.summary()
     if as_json:
         console.print_json({**summary, "vehicle_file": str(out)})

@@ -5,27 +5,16 @@ from typing import Annotated, Any
 
 import typer
 
-from ivl import model
+from ivl.cli.task_options import task_options
 from ivl.errors import ConfigError, IvlError
-from ivl.settings import parse_setting
 
 Folder = Annotated[Path, typer.Argument(metavar="FLIGHTS", help="Folder of flights; `ivl flight import` makes one.")]
-Vehicle = Annotated[str, typer.Option(help="Vehicle; see `ivl list vehicles`, or a YAML file.")]
-Gear = Annotated[str, typer.Option(help="Landing gear that was flown; see `ivl list gears`.")]
-GearSet = Annotated[str, typer.Option(help="Set of landing gears.")]
-Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="A.B=C", help="Change a parameter of the vehicle and hold it.")
-]
 Seed = Annotated[int, typer.Option(help="Seed of everything random.", min=0)]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
-DEFAULT_VEHICLE, DEFAULT_GEAR, DEFAULT_GEAR_SET = "crazyflie21", "wide_short", model.DEFAULT_GEAR_SET
-
-
-def overrides(settings: list[str] | None) -> dict[str, float]:
-    """The parameters of `--set`, checked."""
-    pairs = [parse_setting(text) for text in settings or []]
-    return {name: model.check_override(name, value) for name, value in pairs}
+FLOWN = ("vehicle", "gear", "gear_set")
+"""Fields of the task that a recorded flight does not say itself; `world_options` are the options for them."""
+world_options = task_options(*FLOWN, vehicle="crazyflie21")
 
 
 def flight_package() -> Any:

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from ivl import model
 from ivl.cli import console
 from ivl.cli.console import number, percent
+from ivl.cli.flight import options
+from ivl.cli.task_options import Chosen
 from ivl.errors import ConfigError, IvlError
 from ivl.links import pil
-from ivl.settings import parse_setting
-from ivl.world import World
 
 if TYPE_CHECKING:
     from ivl.flight.replay import Result
@@ -38,33 +37,29 @@ _CUES = (("rrev", "RREV, 1/s", "per_s"), ("of_y", "OF_y, rad/s", "radps"), ("d_c
 _EVENTS = (("trigger", "trigger, samples"), ("cut", "motors off, samples"))
 
 
+@options.world_options
 def replay(
-    flights: Annotated[Path, typer.Argument(metavar="FLIGHTS", help="Folder of flights.")],
+    folder: options.Folder,
+    chosen: Chosen,
     uri: Annotated[
         str | None, typer.Option(help="Where the core runs: pil:// or pil:///path/of/image.elf; default: here.")
-    ] = None,
-    vehicle: Annotated[str, typer.Option(help="Vehicle; see `ivl list vehicles`.")] = "crazyflie21",
-    gear: Annotated[str, typer.Option(help="Landing gear; see `ivl list gears`.")] = "wide_short",
-    gear_set: Annotated[str, typer.Option(help="Set of landing gears.")] = model.DEFAULT_GEAR_SET,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="A.B=C", help="Change a parameter of the world.")
     ] = None,
     battery: Annotated[bool, typer.Option("--battery", help="Tell the core of the logged battery.")] = False,
     step: Annotated[float, typer.Option(help="Numbers in the log are multiples of this, in SI units.", min=0.0)] = 0.0,
     plot: Annotated[Path | None, typer.Option(help="Draw some flights into FILE (.png, .svg or .pdf).")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    as_json: options.Json = False,
 ) -> None:
     """Replay recorded flights; HELP is the text that people see."""
     if plot and plot.suffix not in _SUFFIXES:
         raise ConfigError(f"--plot {plot}: unknown kind of file (allowed {', '.join(_SUFFIXES)})")
-    world = World(vehicle, gear, gear_set, **dict(parse_setting(text) for text in settings or []))
+    world = chosen.make_world()
     chips = _chips(uri) if uri else None
     try:
         from ivl.flight import replay as core  # pyarrow takes a while to load
         from ivl.flight import store
     except ModuleNotFoundError as error:
         raise IvlError(f"{error.name} is not installed: pip install 'ivl[flight]'") from error
-    result = core.replay(store.read(flights), world, chips, battery, step)
+    result = core.replay(store.read(folder), world, chips, battery, step)
     if plot:
         _draw(result, plot)
     if as_json:

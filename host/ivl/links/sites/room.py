@@ -12,6 +12,7 @@ from ivl.links.landing_flight import (
     Point,
     Rollout,
     check_abort,
+    end_level_out,
     make_safe,
     safe_or_why,
     start_point,
@@ -21,7 +22,7 @@ from ivl.links.options import Options
 from ivl.links.packets import Phase, Recording, Request
 from ivl.links.sites.base import Visit, give_back_time
 from ivl.links.tables import Session
-from ivl.links.truth import Resting, outcome_of_flight, suggest_legs
+from ivl.links.truth import Resting, note_no_go, outcome_of_flight, suggest_legs
 from ivl.links.vehicle import Command, Supervisor, Vehicle
 
 CLIMB_MPS, TRAVEL_MPS = 0.5, 0.5
@@ -151,20 +152,28 @@ class Room:
         """Wait until the motors are off for good, read the recorder, and let the operator confirm what is seen."""
         vehicle = self._vehicle
         vehicle.wait(self._is_over, _END_S, "end of the landing")
+        called_off = end_level_out(vehicle) if vehicle.phase == Phase.LEVEL_OUT else None
+        if called_off is None:
+            vehicle.wait(self._is_over, _END_S, "end of the landing")  # of one that aborted while it levelled out
         vehicle.pause(_SETTLE_S)
         self._restore_tumble_check()
         aborted = vehicle.phase == Phase.ABORTED
         why = vehicle.aborted_by
         check_abort(vehicle)
+        decision = vehicle.decision() if called_off is None else (called_off.p_land, called_off.d_decided_m)
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         recording = vehicle.recording(policy_seq)
         seen_at = self._tracking.resting() if self._tracking is not None else None
         resting = seen_at or resting_by_estimate(vehicle, recording)
         suggested = operators.Seen(0 if aborted else suggest_legs(resting, self._world), body_contact=False)
-        seen = self._operator.confirm(suggested, resting, f"aborted: {why}" if aborted else "")
+        note = f"aborted: {why}" if aborted else "called off by the policy" if called_off is not None else ""
+        seen = self._operator.confirm(suggested, resting, note)
         if seen.discard:
             raise RolloutError(f"discarded by the operator{f' (aborted: {why})' if aborted else ''}")
         outcome = outcome_of_flight(recording, vehicle.snapshot(), seen.n_legs, seen.body_contact, resting, self._world)
+        outcome["p_land"], outcome["d_decided_m"] = decision
+        if called_off is not None:
+            note_no_go(outcome, called_off, self._world)
         return outcome, recording
 
     def told(self, landing: Landing) -> str:
@@ -173,7 +182,9 @@ class Room:
 
     def _is_over(self) -> bool:
         vehicle = self._vehicle
-        return vehicle.phase == Phase.DONE or (vehicle.phase == Phase.ABORTED and vehicle.rule in ("landed", "lost"))
+        return vehicle.phase in (Phase.DONE, Phase.LEVEL_OUT) or (
+            vehicle.phase == Phase.ABORTED and vehicle.rule in ("landed", "lost")
+        )
 
     def _restore_tumble_check(self) -> None:
         """The app has switched it on again; the stored parameter outlives a restart, so it is looked at."""
@@ -185,7 +196,4 @@ class Room:
 
 def resting_by_estimate(vehicle: Vehicle, recording: Recording) -> Resting:
     """Where the vehicle's own estimate has it, with the attitude of the recorder's last row."""
-    if not len(recording.rows):
-        return Resting(vehicle.position_W_m[2], float("nan"))
-    x, y, _, _ = recording.rows["q_WB"][-1]
-    return Resting(vehicle.position_W_m[2], float(1.0 - 2.0 * (x * x + y * y)))
+    return Resting.of(vehicle.position_W_m, recording.rows["q_WB"][-1] if len(recording.rows) else None)

@@ -13,7 +13,7 @@ from ivl.links.tables import Session
 from ivl.links.vehicle import Command, Vehicle
 
 _DIFFERENCES_TOLD = 6
-_IDLE_S = 3.0
+_IDLE_S, _READY_S = 3.0, 3.0
 
 
 class OtherWorld(FlyingEnds):
@@ -102,12 +102,15 @@ class Simulator:
 
     def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
         """The simulator's truth; the recording only if it is wanted."""
+        vehicle = self._vehicle
         outcome = self._extras.wait_for_outcome(policy_seq)
+        if vehicle.phase == Phase.LEVEL_OUT:  # called off, and hovers: taken over, as a drone would be
+            vehicle.ask_for(Command(Request.HOVER, vehicle.position_W_m), (Phase.READY,), _READY_S)
         if not self._visit.options.keep_recordings:
             return outcome, None
         # the end of the cycle is also that of a recording which is not full yet
-        self._vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
-        return outcome, self._vehicle.recording(policy_seq)
+        vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
+        return outcome, vehicle.recording(policy_seq)
 
     def told(self, landing: Landing) -> str:
         """Nothing: it would be many lines a second."""

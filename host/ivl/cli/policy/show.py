@@ -1,0 +1,97 @@
+"""`ivl policy show`."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from ivl.cli import console
+from ivl.policy import file
+from ivl.policy.file import PolicyFile
+from ivl.policy.shape import General, is_general
+
+HELP = """Show what a policy file holds: numbers, origin, score, and its threshold R* over the sensed velocities.
+
+\b
+Examples:
+  ivl policy show g.yaml
+      for people
+  ivl policy show g.yaml --json
+      the file and the table, for a script
+"""
+
+_VX_MPS = np.arange(0.0, 4.01, 0.5)
+_VZ_MPS = np.arange(0.5, 4.01, 0.5)
+
+
+def show(
+    path: Annotated[Path, typer.Argument(metavar="FILE", help="Policy file.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Show a policy; HELP is the text that people see."""
+    policy = file.load(path)
+    if as_json:
+        console.print_json({**policy.model_dump(mode="json"), "crc": policy.crc, "table": _table(policy)})
+    else:
+        _print(policy)
+
+
+def _table(policy: PolicyFile) -> dict[str, Any] | None:
+    """Threshold, moment and probability over the velocities, row by row of vz; None of a form for one approach."""
+    if not is_general(policy.form):
+        return None
+    general = General(policy.form)
+    vx, vz = np.meshgrid(_VX_MPS, _VZ_MPS)
+    return {
+        "vx_mps": _VX_MPS.tolist(),
+        "vz_mps": _VZ_MPS.tolist(),
+        "threshold_per_s": general.thresholds(policy.values, vx, vz).tolist(),
+        "moment_Nmm": general.moments(policy.values, vx, vz).tolist(),
+        "p_land": general.probabilities(policy.values, vx, vz).tolist(),
+    }
+
+
+def _print(policy: PolicyFile) -> None:
+    form = policy.shape
+    _line("form", f"{form.name}: {form.doc}")
+    for p, value in zip(form.params, policy.values, strict=True):
+        _line(f"  {p.name}", f"{value:.6g} {p.unit}")
+    _line("checksum on a vehicle", f"{policy.crc:08x}")
+    for task in policy.tasks:
+        told = task.model_dump(mode="json", exclude_defaults=True)
+        overrides = {name: setting["value"] for name, setting in told.pop("overrides", {}).items()}
+        _line("learned on", ", ".join(f"{name} {value}" for name, value in {**told, **overrides}.items()))
+    if policy.training is not None:
+        t = policy.training
+        _line("learned by", f"{t.learner.name}, seed {t.seed}, {t.rollouts} flights{', interrupted' * t.interrupted}")
+        for region in t.regions:
+            (v0, v1), (a0, a1) = region.speeds_mps, region.angles_deg
+            _line("approaches", f"{v0:g} to {v1:g} m/s, {a0:g} to {a1:g} degrees")
+        _line(
+            "objective",
+            f"{console.number(t.objective, 4)} (of the map's policy {console.number(t.start_objective, 4)})",
+        )
+    if policy.score is not None:
+        s = policy.score
+        _line("score", f"{console.percent(s.landed)} land, {console.percent(s.clean)} clean, of {s.flights} flights")
+    found = _table(policy)
+    if found is None:
+        return
+    for name, title, digits in (
+        ("threshold_per_s", "R* (1/s) over v_x (m/s, to the right) and v_z (m/s, down)", 2),
+        ("p_land", "probability of a landing", 2),
+    ):
+        table = Table(title=title, title_justify="left", box=None, padding=(0, 1))
+        table.add_column("v_z", justify="right")
+        for vx in found["vx_mps"]:
+            table.add_column(f"{vx:g}", justify="right")
+        for vz, row in zip(found["vz_mps"], found[name], strict=True):
+            table.add_row(f"{vz:g}", *(f"{value:.{digits}f}" for value in row))
+        console.out.print()
+        console.out.print(table)
+
+
+def _line(name: str, text: str) -> None:
+    console.out.print(f"{name:24s} {text}", highlight=False, soft_wrap=True)

@@ -1,0 +1,70 @@
+"""Batches of flights: each policy on each approach in the world of each task."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from ivl.outcome import Outcomes, clean, four_leg
+from ivl.policy.region import Approaches
+from ivl.task import Setup
+from ivl.world import World
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class PolicyTask(Setup):
+    """What a policy is learned on: a task without speed and angle."""
+
+    gear: str = Field(description="Landing gear; see `ivl list gears`.")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A task with its world, which is built once."""
+
+    task: PolicyTask
+    world: World
+
+    @staticmethod
+    def of(task: PolicyTask) -> "Place":
+        """Build the world."""
+        return Place(task, task.world_of(task.gear))
+
+
+def fly(
+    places: Sequence[Place], form: str, theta: npt.ArrayLike, approaches: Approaches, threads: int | None = None
+) -> list[Outcomes]:
+    """Fly policies, shape (..., dim), over all approaches in each place.
+
+    All policies meet the same approaches with the same random numbers.
+
+    Returns:
+        Outcomes of each place, shape (..., n).
+    """
+    columns = np.moveaxis(np.asarray(theta, dtype=np.float64)[..., None, :], -1, 0)
+    return [
+        place.world.rollouts(
+            approaches.speed_mps,
+            approaches.angle_deg,
+            *columns,
+            form=form,
+            seed=approaches.seed,
+            stream=approaches.stream,
+            start=place.task.start,
+            threads=threads,
+        )
+        for place in places
+    ]
+
+
+def score(outcomes: Outcomes) -> FloatArray:
+    """What is made large: 1 for a clean landing, 1/2 for one with body or rotor contact, 0 for none."""
+    return np.asarray(0.5 * four_leg(outcomes) + 0.5 * clean(outcomes), dtype=np.float64)
+
+
+def objective(flown: Sequence[Outcomes]) -> FloatArray:
+    """Mean score of each policy over approaches and places, shape (...) of the policies."""
+    return np.asarray(np.mean([score(outcomes).mean(axis=-1) for outcomes in flown], axis=0))

@@ -1,0 +1,200 @@
+"""An approach that the policy calls off, flown over a link: scored, never discarded, and the vehicle comes home."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ivl import cli, experiment
+from ivl.experiment import Experiment
+from ivl.links.crazyflie import CrazyflieSource
+from ivl.links.landing_flight import Rollout, make_safe
+from ivl.links.operators import Seen
+from ivl.links.options import Options
+from ivl.links.packets import Phase, Request
+from ivl.links.truth import Resting
+from ivl.links.vehicle import Command, Vehicle
+from ivl.policy import file, use
+from ivl.policy.file import PolicyFile
+from ivl.policy.flying import PolicyTask
+from ivl.policy.shape import General
+from ivl.silproc import SilProcess
+from ivl.source import Plan
+
+SLOW, FAST = (0.6, 60.0), (2.5, 60.0)
+"""Approaches that the policy refuses and flies."""
+
+
+class Script:
+    """An operator who confirms what is suggested."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def place(self, start_W_m: tuple[float, float, float]) -> None:
+        assert start_W_m[2] > 0.3
+        self.asked.append("place")
+
+    def change_battery(self, battery_V: float, needed_V: float) -> None:
+        raise AssertionError(f"battery {battery_V}, needed {needed_V}")
+
+    def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
+        assert resting.height_m < 0.2, "it stands on the floor"
+        self.asked.append(f"confirm {suggested.n_legs} {note}".strip())
+        return suggested
+
+
+@pytest.fixture(scope="module")
+def policy() -> PolicyFile:
+    """It lands in the box, and refuses slow approaches."""
+    shape = General("polynomial2")
+    theta = shape.level(5.082, 10.0)
+    theta[shape.threshold] = [5.082, 0.253, 1.408, -0.208, 0.379, -0.922]
+    theta[shape.go_p_min] = 0.5
+    theta[shape.go] = [5.0, 4.0, 8.0] + [0.0] * 7
+    task = PolicyTask(
+        vehicle="habas2021",
+        gear="wide_short",
+        gear_set="as_simulated",
+        estimator="known_height_predicted",
+        start="flown",
+    )
+    return file.make(shape.form, theta.tolist(), [task], None, None)
+
+
+def flies(policy: PolicyFile, approach: tuple[float, float]) -> Experiment:
+    """An experiment that flies the policy at this approach."""
+    change = use.on_its_task(policy)
+    speed_mps, angle_deg = approach
+    return experiment.load("experiments/paper_vertical.yaml", [], change, speed_mps=speed_mps, angle_deg=angle_deg)
+
+
+@pytest.fixture
+def server(policy: PolicyFile) -> Iterator[SilProcess]:
+    with SilProcess(flies(policy, SLOW).make_world()) as process:
+        yield process
+
+
+def here(chosen: Experiment, seed: int, stream: int) -> np.ndarray:
+    """The same landing in this process, shape (1,)."""
+    outcome = chosen.make_world().rollouts(
+        chosen.speed_mps, chosen.angle_deg, *chosen.policy.mu0, form=chosen.policy.form,
+        seed=[seed], stream=[stream], start=chosen.start,
+    )  # fmt: skip
+    return np.asarray(outcome)
+
+
+def vehicle_of(source: CrazyflieSource) -> Vehicle:
+    assert source._vehicle is not None
+    return source._vehicle
+
+
+def plan_of(chosen: Experiment, n: int) -> Plan:
+    return Plan(np.tile(chosen.policy.mu0, (n, 1)), np.zeros(n, dtype=np.uint64), np.arange(n, dtype=np.uint64))
+
+
+def test_a_no_go_over_a_link_is_bit_for_bit_that_of_this_process(policy: PolicyFile, server: SilProcess) -> None:
+    chosen = flies(policy, SLOW)
+    with CrazyflieSource(server.uri, chosen) as source:  # which proves one landing by itself
+        (flown,) = source.fly(plan_of(chosen, 1))
+        assert vehicle_of(source).phase == Phase.READY, "it was asked to hover again"
+        assert vehicle_of(source).aborted_by == ""
+        assert source.n_discarded == 0
+        assert flown.discarded == ""
+        assert source.warnings == []
+    outcome = flown.outcomes
+    assert outcome.tobytes() == here(chosen, 0, 0).tobytes()
+    assert (outcome["no_go"][0], outcome["n_legs"][0], outcome["triggered"][0]) == (1, 0, 0)
+    assert np.isnan(outcome["t_impact_s"][0])
+
+
+def test_landings_and_no_goes_take_turns_on_one_connection(policy: PolicyFile, server: SilProcess) -> None:
+    """The policy goes with each flight, so that the one of the flight before does not stay in force."""
+    chosen = flies(policy, SLOW)
+    free = General("polynomial2").always_go(policy.values)
+    with CrazyflieSource(server.uri, chosen) as source:
+        outcomes = [source.fly_one(Rollout(tuple(theta), 0, 7)).outcome for theta in (free, policy.values, free)]
+        no_go = [int(outcome["no_go"][0]) for outcome in outcomes]
+    assert no_go == [0, 1, 0]
+    assert outcomes[0].tobytes() == outcomes[2].tobytes()
+
+
+def test_a_vehicle_that_comes_back_gets_the_policy_again(
+    policy: PolicyFile, server: SilProcess, tmp_path: Path
+) -> None:
+    chosen = flies(policy, FAST)
+    with CrazyflieSource(server.uri, chosen, Options(tmp_path)) as source:
+        (first,) = source.fly(plan_of(chosen, 1))
+        server.kill()
+        server.start()
+        (second,) = source.fly(plan_of(chosen, 1))
+    assert first.outcomes.tobytes() == second.outcomes.tobytes() == here(chosen, 0, 0).tobytes()
+    assert second.outcomes["n_legs"][0] == 4
+    lines = [json.loads(line) for line in (tmp_path / "flights.jsonl").read_text().splitlines()]
+    flown = [line for line in lines if line["what"] == "flown"]
+    assert len(flown) == 2
+    assert [[line[name] for name in policy.shape.names] for line in flown] == [policy.values] * 2
+
+
+def test_a_rehearsal_ends_a_no_go_on_the_floor_with_the_outcome_of_the_simulator(
+    policy: PolicyFile, server: SilProcess, tmp_path: Path
+) -> None:
+    chosen, script = flies(policy, SLOW), Script()
+    with CrazyflieSource(server.uri, chosen, Options(tmp_path, script, rehearse=True)) as source:
+        flown = list(source.fly(plan_of(chosen, 2)))
+        assert source.n_discarded == 0
+    assert script.asked == ["place", "confirm 0 called off by the policy"] * 2
+    for stream, portion in enumerate(flown):
+        outcome, known = portion.outcomes, here(chosen, 0, stream)
+        assert portion.discarded == ""
+        for name in ("no_go", "end_reason", "n_legs", "triggered", "body_contact"):
+            assert outcome[name][0] == known[name][0], name
+        # flown from the floor, so the approach begins a few millimetres elsewhere
+        assert outcome["p_land"][0] == pytest.approx(known["p_land"][0], abs=0.02)
+        assert outcome["d_decided_m"][0] == pytest.approx(known["d_decided_m"][0], abs=0.01)
+        assert outcome["d_min_m"][0] == pytest.approx(known["d_min_m"][0], abs=0.03)
+        assert np.isnan(outcome["t_impact_s"][0])
+
+
+def test_a_rehearsed_landing_tells_its_decision_too(policy: PolicyFile, server: SilProcess) -> None:
+    chosen = flies(policy, FAST)
+    with CrazyflieSource(server.uri, chosen, Options(operator=Script(), rehearse=True)) as source:
+        vehicle_of(source)  # the operator's script checks that a vehicle lies on the floor; one that hangs does not
+        source._site._operator.confirm = lambda suggested, *_: suggested  # type: ignore[union-attr]
+        outcome = source.fly_one(Rollout(tuple(policy.values))).outcome
+    known = here(chosen, 0, 0)
+    assert (outcome["no_go"][0], outcome["n_legs"][0]) == (0, 4)
+    assert outcome["p_land"][0] == pytest.approx(known["p_land"][0], abs=0.01)
+    assert outcome["d_decided_m"][0] == pytest.approx(known["d_decided_m"][0], abs=0.03)
+
+
+def test_a_vehicle_that_levels_out_is_brought_down_safely(policy: PolicyFile, server: SilProcess) -> None:
+    chosen = flies(policy, SLOW)
+    with CrazyflieSource(server.uri, chosen, Options(operator=Script(), rehearse=True)) as source:
+        vehicle, site = vehicle_of(source), source._site
+        assert site is not None
+        start = site.to_start(Rollout(tuple(policy.values)))
+        vehicle.put_policy(policy.shape, policy.values)
+        vehicle.ask_for(Command(Request.HOVER, start), (Phase.READY,), 5.0)
+        approach = Command(Request.APPROACH, start, SLOW[0], np.radians(SLOW[1]))
+        vehicle.ask_for(approach, (Phase.LEVEL_OUT,), 5.0)
+        assert make_safe(vehicle) == "landed, disarmed"
+        assert vehicle.phase == Phase.IDLE
+
+
+def test_the_command_flies_a_policy_file(
+    policy: PolicyFile, server: SilProcess, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "g.yaml"
+    file.save(policy, path)
+    for (speed, angle), legs in ((SLOW, 0), (FAST, 4)):
+        words = ["--policy", str(path), "--speed", str(speed), "--angle", str(angle), "--json"]
+        assert cli.run(["fly", "--uri", server.uri, *words]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert cli.run(["rollout", *words]) == 0
+        in_process = json.loads(capsys.readouterr().out)
+        assert told["outcome"] == in_process
+        assert told["warnings"] == []
+        assert told["outcome"]["n_legs"] == legs

@@ -1,0 +1,399 @@
+"""Learning a policy for every approach, its file, its use and its judgement."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from ivl import cli, experiment, forms
+from ivl.errors import ConfigError
+from ivl.outcome import clean, four_leg
+from ivl.policy import assess as judging
+from ivl.policy import file, general, use
+from ivl.policy.file import PolicyFile
+from ivl.policy.flying import Place, PolicyTask, fly
+from ivl.policy.learn import Progress, learn
+from ivl.policy.region import PLANE, Region, Series
+from ivl.policy.shape import GO, General
+from ivl.seeds import Purpose
+from ivl.sweep import config as sweep_config
+
+STEEP = Region(speeds_mps=[2.3, 2.7], angles_deg=[75.0, 90.0])
+TASK = PolicyTask(
+    vehicle="habas2021", gear="wide_short", gear_set="as_simulated", estimator="known_height_predicted", start="flown"
+)
+Capture = pytest.CaptureFixture[str]
+
+
+def tiny(**changes: Any) -> dict[str, Any]:
+    """Raw data of an experiment that is learned within seconds: nearly vertical approaches."""
+    task = {"vehicle": "habas2021", "gear": "wide_short", "gear_set": "as_simulated"}
+    return {
+        "name": "tiny",
+        "doc": "Steep approaches.",
+        "form": "polynomial2",
+        "tasks": [{**task, "estimator": "known_height_predicted"}],
+        "regions": [{"speeds_mps": [2.3, 2.7], "angles_deg": [75.0, 90.0]}],
+        "map": {"n_speeds": 2, "n_angles": 2, "n_thresholds": 30, "moments_norm": [0.8], "tau_s": [0.1, 0.4]},
+        "learner": {"name": "cmaes"},
+        "search": {"n_candidates": 4, "n_approaches": 8, "n_iterations": 3, "n_select": 60},
+        "go": {
+            "region": {"speeds_mps": [0.5, 3.0], "angles_deg": [60.0, 90.0]}, "n_approaches": 200, "n_held_out": 100,
+        },
+        **changes,
+    }  # fmt: skip
+
+
+def tiny_experiment(**changes: Any) -> general.GeneralExperiment:
+    return general.from_data(tiny(**changes), "tiny.yaml")
+
+
+@pytest.fixture(scope="session")
+def learned() -> PolicyFile:
+    return learn(tiny_experiment())
+
+
+def good_theta() -> list[float]:
+    """Numbers that land in all of the box, and refuse slow approaches."""
+    shape = General("polynomial2")
+    theta = shape.level(5.082, 10.0)
+    theta[shape.threshold] = [5.082, 0.253, 1.408, -0.208, 0.379, -0.922]
+    theta[shape.go_p_min] = 0.5
+    theta[shape.go] = [5.0, 4.0, 8.0] + [0.0] * 7
+    return theta.tolist()
+
+
+@pytest.fixture
+def by_hand() -> PolicyFile:
+    return file.make(General("polynomial2").form, good_theta(), [TASK], None, None)
+
+
+@pytest.fixture
+def path(by_hand: PolicyFile, tmp_path: Path) -> Path:
+    file.save(by_hand, tmp_path / "g.yaml")
+    return tmp_path / "g.yaml"
+
+
+# ---- learning
+
+
+def test_steep_approaches_are_learned_to_land_by_a_threshold_that_is_known(learned: PolicyFile) -> None:
+    """The paper's own policy for 2.5 m/s straight up is 4.8 1/s; what is learned must land on fresh approaches."""
+    shape = General("polynomial2")
+    (threshold,) = shape.thresholds(learned.values, [0.0], [2.5])
+    assert 4.2 < threshold < 5.8
+    approaches = Series([STEEP], 99, Purpose.ASSESS).next(200)
+    (outcomes,) = fly([Place.of(learned.tasks[0])], "polynomial2", shape.always_go(learned.values), approaches)
+    assert four_leg(outcomes).mean() > 0.9
+    assert clean(outcomes).mean() > 0.85
+
+
+def test_it_says_how_it_was_learned(learned: PolicyFile) -> None:
+    training, score = learned.training, learned.score
+    assert training is not None
+    assert score is not None
+    assert training.learner.name == "cmaes"
+    assert training.approaches == 3 * 8
+    # map, search, choice among the start and three ends, go / no-go twice
+    assert training.rollouts == 30 * 4 + 3 * 4 * 8 + 4 * 60 + 2 * 300
+    assert training.objective == pytest.approx(0.5 * (score.landed + score.clean))
+    assert training.start_objective is not None
+    assert training.objective >= training.start_objective
+    assert any(learned.theta[name].value != 0.0 for name in GO)
+
+
+def test_equal_seeds_give_equal_files_and_others_do_not(learned: PolicyFile) -> None:
+    assert learn(tiny_experiment(), threads=1) == learned
+    assert learn(tiny_experiment(seed=1)).values != learned.values
+
+
+@pytest.mark.parametrize("learner", ["ephe", "ephe_robust", "bo"])
+def test_any_learner_searches(learner: str, learned: PolicyFile) -> None:
+    found = learn(tiny_experiment(learner={"name": learner}))
+    assert found.training is not None
+    assert learned.training is not None
+    assert found.training.learner.name == learner
+    assert found.training.start_objective == learned.training.start_objective
+
+
+def test_the_search_moves_a_start_that_misses_to_where_it_lands(by_hand: PolicyFile) -> None:
+    off = list(by_hand.values)
+    off[0] -= 0.9  # 35 ms too early
+    begin = file.make(by_hand.shape, off, [TASK], None, None)
+    search = {"n_candidates": 8, "n_approaches": 24, "n_iterations": 12, "n_select": 100, "spread_per_s": 1.5}
+    found = learn(tiny_experiment(search=search), start=begin)
+    assert found.training is not None
+    assert found.training.start_objective is not None
+    assert found.training.objective is not None
+    assert found.training.objective > found.training.start_objective + 0.2
+
+
+def test_two_tasks_count_both() -> None:
+    tasks = [tiny()["tasks"][0], {**tiny()["tasks"][0], "gear": "narrow_short"}]
+    both = learn(tiny_experiment(tasks=tasks))
+    assert [task.gear for task in both.tasks] == ["wide_short", "narrow_short"]
+    assert both.score is not None
+    assert both.score.flights == 2 * 60
+
+
+def test_an_interruption_keeps_the_best_so_far() -> None:
+    def interrupt(at: Progress) -> None:
+        if at.stage == "search" and at.done > 0.5:
+            raise KeyboardInterrupt
+
+    found = learn(tiny_experiment(), interrupt)
+    assert found.training is not None
+    assert found.training.interrupted
+    assert found.training.objective is None
+    assert found.theta["go_p_min"].value == 0.0
+
+
+def test_an_interruption_before_there_is_anything_gives_nothing() -> None:
+    def interrupt(_: Progress) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        learn(tiny_experiment(), interrupt)
+
+
+def test_a_region_without_any_landing_is_said() -> None:
+    hopeless = [{"speeds_mps": [0.25, 0.3], "angles_deg": [20.0, 25.0]}]
+    with pytest.raises(ConfigError, match="no approach of these regions ends in a landing"):
+        learn(tiny_experiment(regions=hopeless))
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"form": "constant"}, "form constant: is not for every approach"),
+        ({"form": "no"}, "policy form 'no' is unknown"),
+        ({"regions": ["boxx"]}, r"regions\.0: .*unknown region \(allowed box, plane"),
+        ({"regions": [{"speeds_mps": [3.0, 2.0], "angles_deg": [20.0, 90.0]}]}, "speeds_mps: 3.0 must be below 2.0"),
+        ({"regions": [{"speeds_mps": [2.0, 30.0], "angles_deg": [20.0, 90.0]}]}, "30.0 is out of range"),
+        ({"learner": {"name": "nobody"}}, "no learner 'nobody'"),
+        ({"learner": {"name": "ephe", "options": {"n_bst": 2}}}, "n_bst"),
+        ({"tasks": []}, "tasks"),
+        ({"map": {"moments_norm": [0.0]}}, "moments_norm"),
+        ({"serach": {}}, "serach: unknown key .*did you mean 'search'"),
+    ],
+)
+def test_a_wrong_experiment_is_refused_in_one_line(change: dict[str, Any], told: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^tiny\.yaml: .*{told}") as error:
+        tiny_experiment(**change)
+    assert "\n" not in str(error.value)
+
+
+def test_settings_reach_every_task_and_further_files_add_theirs(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(tiny(name=name)))
+    paths = [str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml")]
+    loaded = general.load(paths, ["gear=wide_long", "sense.latency=0.02", "search.n_select=5"], seed=4)
+    assert [task.gear for task in loaded.tasks] == ["wide_long", "wide_long"]
+    assert [task.overrides["sense.latency"].value for task in loaded.tasks] == [0.02, 0.02]
+    assert (loaded.search.n_select, loaded.seed, loaded.name) == (5, 4, "a")
+    assert general.load(["experiments/general.yaml"]).form == "polynomial3"
+    with pytest.raises(ConfigError, match="learn it with ivl policy learn"):
+        experiment.load("experiments/general.yaml")
+    with pytest.raises(ConfigError, match="for ivl learn"):
+        general.load(["experiments/paper_vertical.yaml"])
+
+
+# ---- the file
+
+
+def test_a_file_reads_back_as_it_was(learned: PolicyFile, by_hand: PolicyFile, tmp_path: Path) -> None:
+    for policy in (learned, by_hand):
+        file.save(policy, tmp_path / "p.yaml")
+        again = file.load(tmp_path / "p.yaml")
+        assert again == policy
+        assert again.values == policy.values
+        assert again.crc == policy.crc
+        assert [entry.name for entry in tmp_path.iterdir()] == ["p.yaml"]
+
+
+def test_a_file_of_numbers_alone_is_enough(by_hand: PolicyFile, tmp_path: Path) -> None:
+    data = by_hand.model_dump(mode="json")
+    short = {name: data[name] for name in ("ivl_policy", "form", "theta", "tasks")}
+    (tmp_path / "p.yaml").write_text(yaml.safe_dump(short))
+    assert file.load(tmp_path / "p.yaml").values == by_hand.values
+
+
+@pytest.mark.parametrize(
+    ("where", "value", "told"),
+    [
+        (("theta", "r_0_per_s", "value"), 5.5, "digest: .*changed after it was written"),
+        (("theta", "r_0_per_s", "value"), 99.0, r"r_0_per_s: value 99.0 is out of range \(allowed -40 .. 40 1/s\)"),
+        (("theta", "r_0_per_s", "value"), "many", r"theta\.r_0_per_s\.value: value 'many'"),
+        (("theta", "r_0_per_s", "unit"), "Hz", r"theta\.r_0_per_s: unit 'Hz' \(the form polynomial2 has '1/s'\)"),
+        (("theta", "r_0_per_s"), None, r"theta\.r_0_per_s"),
+        (("theta", "r_zero"), {"value": 1.0, "unit": "1/s"}, r"theta\.r_zero: unknown key"),
+        (("form",), "polynomial9", "policy form 'polynomial9' is unknown"),
+        (("form",), "bilinear", r"theta\.r_00_per_s: is missing"),
+        (("ivl_policy",), 2, "ivl_policy: value 2"),
+        (("tasks",), [], "tasks"),
+        (("tasks", 0, "gear"), 3, r"tasks\.0\.gear"),
+        (("digest",), "0" * 64, "digest"),
+    ],
+)
+def test_a_damaged_file_is_refused_with_the_field(path: Path, where: tuple[Any, ...], value: Any, told: str) -> None:
+    data = yaml.safe_load(path.read_text())
+    place = data
+    for key in where[:-1]:
+        place = place[key]
+    place[where[-1]] = value
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(ConfigError, match=rf"^g\.yaml: .*{told}") as error:
+        file.load(path)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["", "- 1", "form: [", "ivl_policy: 1"])
+def test_what_is_no_policy_is_refused(text: str, path: Path) -> None:
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"^g\.yaml: "):
+        file.load(path)
+
+
+def test_a_missing_file_and_a_folder_that_is_not_there_are_said(by_hand: PolicyFile, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"no\.yaml: cannot be read"):
+        file.load(tmp_path / "no.yaml")
+    with pytest.raises(ConfigError, match="cannot be written"):
+        file.save(by_hand, tmp_path / "no" / "p.yaml")
+
+
+# ---- judging
+
+
+def test_an_assessment_is_what_a_direct_count_says(by_hand: PolicyFile) -> None:
+    found = judging.assess(by_hand, n_approaches=300, seed=5)
+    shape, place = General("polynomial2"), Place.of(TASK)
+    approaches = Series([PLANE], 5, Purpose.ASSESS).next(300)
+    counted = []
+    for theta in (shape.always_go(by_hand.values), np.array(by_hand.values)):
+        counted.append(
+            place.world.rollouts(
+                approaches.speed_mps, approaches.angle_deg, *theta, form="polynomial2",
+                seed=approaches.seed, stream=np.arange(300), start="flown",
+            )
+        )  # fmt: skip
+    free, own = counted
+    landed, refused = free.n_legs >= 3, own.no_go == 1
+    assert found.plane.landed.value == landed.mean()
+    assert found.plane.clean.value == (landed & (free.body_contact == 0)).mean()
+    assert found.plane.landed.low < landed.mean() < found.plane.landed.high
+    assert found.go is not None
+    strike = ~landed & ((free.body_contact == 1) | (free.base_contact == 1))
+    assert 10 < refused.sum() < 290
+    assert found.go.strikes_avoided.value == (refused & strike).sum() / strike.sum()
+    assert found.go.refused_good.value == (refused & landed).sum() / 300
+    assert found.go.no_go.value == refused.mean()
+    assert found.go.level_out_contacts == (refused & np.isfinite(own.t_impact_s)).sum()
+    told = free.p_land > 0
+    pairs = free.p_land[told & landed][:, None] - free.p_land[told & ~landed][None, :]
+    assert found.go.auc == pytest.approx(((pairs > 0) + 0.5 * (pairs == 0)).mean())
+    assert found.box.landed.value > 0.9
+    # the flips of the two are the same, as far as both flip
+    both = (own.triggered == 1) & (free.triggered == 1)
+    assert (own.n_legs[both] == free.n_legs[both]).all()
+
+
+def test_an_assessment_is_repeatable_and_of_fresh_approaches(by_hand: PolicyFile) -> None:
+    first, again, other = (judging.assess(by_hand, n_approaches=60, seed=seed).as_dict() for seed in (1, 1, 2))
+    assert first == again != other
+    text = json.dumps(first, allow_nan=False)
+    assert set(json.loads(text)) == {"box", "plane", "shaped", "go"}
+    assert {"landed", "clean"} <= set(first["box"])
+    assert {"auc", "calibration_error", "strikes_avoided", "refused_good", "level_out_contacts"} <= set(first["go"])
+
+
+# ---- use
+
+
+def test_a_policy_begins_the_search_of_an_experiment(by_hand: PolicyFile) -> None:
+    begun = experiment.load("experiments/paper_vertical.yaml", [], use.as_start(by_hand), learner="ephe")
+    assert begun.policy.form == "polynomial2"
+    assert begun.policy.mu0 == by_hand.values
+    assert begun.gear_set == "as_simulated"
+    held = General("polynomial2").go_p_min
+    asked = begun.make_learner(0).ask(20)
+    assert np.ptp(asked[:, :held], axis=0).min() > 0.05
+    assert np.ptp(asked[:, held:], axis=0).max() < 1e-3
+    own = experiment.load("experiments/paper_vertical.yaml", ["speed_mps=1.2"], use.on_its_task(by_hand))
+    assert (own.start, own.estimator, own.speed_mps) == ("flown", "known_height_predicted", 1.2)
+
+
+def test_a_policy_of_the_same_form_keeps_spreads_and_bounds() -> None:
+    constant = file.make(forms.by_name("constant"), [4.7, 8.1], [TASK], None, None)
+    begun = experiment.load("experiments/paper_vertical.yaml", [], use.as_start(constant))
+    assert begun.policy.mu0 == [4.7, 8.1]
+    assert begun.policy.parameters[0].sigma0 == 1.5
+    assert begun.check.grid
+    outside = file.make(forms.by_name("constant"), [9.0, 8.1], [TASK], None, None)
+    with pytest.raises(ConfigError, match=r"rrev_c_per_s\.mu0: value 9.0 is out of range"):
+        experiment.load("experiments/paper_vertical.yaml", [], use.as_start(outside))
+
+
+def test_a_sweep_flies_a_policy_as_it_is(by_hand: PolicyFile) -> None:
+    grid = sweep_config.load_sweep("sweeps/smoke.yaml", [], [], use.as_it_is(by_hand, None))
+    assert grid.learner.name == "fixed"
+    trial = grid.experiment("wide_long", 2.5, 60.0, 0)
+    learner = trial.make_learner(3)
+    learner.tell(learner.ask(), np.arange(8.0))
+    assert (learner.ask(5) == np.array(by_hand.values)).all()
+    assert (learner.result.sigma == 0.0).all()
+    searching = sweep_config.load_sweep("sweeps/smoke.yaml", [], [], use.as_it_is(by_hand, "ephe"), learner="ephe")
+    assert searching.learner.name == "ephe"
+    with pytest.raises(ConfigError, match=r"vary\.learner\.name"):
+        use.as_it_is(by_hand, None)({"vary": {"learner.name": ["ephe", "bo"]}})
+
+
+def run(arguments: list[str], capsys: Capture, code: int = 0) -> str:
+    assert cli.run(arguments) == code, capsys.readouterr().err
+    return capsys.readouterr().out
+
+
+def test_commands_learn_show_and_judge(tmp_path: Path, capsys: Capture, learned: PolicyFile) -> None:
+    task, out = tmp_path / "tiny.yaml", tmp_path / "g.yaml"
+    task.write_text(yaml.safe_dump(tiny()))
+    data = json.loads(run(["policy", "learn", str(task), "--out", str(out), "--json"], capsys))
+    assert data["digest"] == learned.digest
+    assert file.load(out) == learned
+    shown = json.loads(run(["policy", "show", str(out), "--json"], capsys))
+    assert len(shown["table"]["threshold_per_s"]) == len(shown["table"]["vz_mps"])
+    text = run(["policy", "show", str(out)], capsys)
+    for word in ("polynomial2", "r_xx_per_s", "cmaes", "2.3 to 2.7 m/s", "R* (1/s)", f"{learned.crc:08x}"):
+        assert word in text
+    judged = ["policy", "assess", str(out), "--approaches", "40"]
+    own = json.loads(run([*judged, "--json"], capsys))
+    late = json.loads(run([*judged, "--set", "sense.latency=0.05", "--json"], capsys))
+    assert own["box"]["flights"] == 40
+    assert late["box"]["landed"] < own["box"]["landed"]
+    assert "body strikes avoided" in run(judged, capsys)
+
+
+def test_a_landing_is_flown_on_what_the_policy_was_learned_on(path: Path, capsys: Capture, by_hand: PolicyFile) -> None:
+    told = json.loads(run(["rollout", "--policy", str(path), "--speed", "2.5", "--angle", "60", "--json"], capsys))
+    outcome = Place.of(TASK).world.rollouts(2.5, 60.0, *by_hand.values, form=by_hand.form, start="flown", stream=0)
+    assert told["n_legs"] == 4
+    assert told["t_impact_s"] == float(outcome["t_impact_s"])
+    slow = json.loads(run(["rollout", "--policy", str(path), "--speed", "0.6", "--angle", "60", "--json"], capsys))
+    assert (slow["end_reason"], slow["no_go"], slow["n_legs"], slow["t_impact_s"]) == ("no_go", 1, 0, None)
+    other = ["rollout", "--policy", str(path), "--gear", "narrow_long", "--speed", "2.5", "--angle", "60", "--json"]
+    assert json.loads(run(other, capsys))["t_impact_s"] != told["t_impact_s"]
+
+
+@pytest.mark.parametrize("more", [["--rrev", "4.8"], ["--moment", "8"], ["--form", "constant"], ["--theta", "4.8,8"]])
+def test_two_words_for_a_policy_are_refused(path: Path, capsys: Capture, more: list[str]) -> None:
+    assert cli.run(["rollout", "--policy", str(path), "--speed", "2.5", "--angle", "60", *more]) == 2
+    assert f"already given by {more[0]}" in capsys.readouterr().err
+
+
+def test_a_start_of_another_form_is_refused(path: Path, tmp_path: Path, capsys: Capture) -> None:
+    (tmp_path / "tiny.yaml").write_text(yaml.safe_dump(tiny(form="bilinear")))
+    arguments = ["policy", "learn", str(tmp_path / "tiny.yaml"), "--out", str(tmp_path / "n.yaml")]
+    assert cli.run([*arguments, "--policy", str(path)]) == 2
+    assert "the policy to start from is of the form polynomial2" in capsys.readouterr().err
+    assert not (tmp_path / "n.yaml").exists()
