@@ -27,7 +27,7 @@ HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) $(FORMS_SOURCES) tests/app/s
 # ---- Cortex-M4F: the SDK's flags, and the one of our Kbuild files
 
 ARM       := build/firmware$(OWN)
-ARM_FLAGS := -Os -Werror -Wall -Wmissing-braces -fno-strict-aliasing -std=gnu11 -fno-math-errno -Wdouble-promotion -ffunction-sections \
+ARM_FLAGS := -DIVL_NO_TEXT -Os -Werror -Wall -Wmissing-braces -fno-strict-aliasing -std=gnu11 -fno-math-errno -Wdouble-promotion -ffunction-sections \
              -fdata-sections -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 -g3 -ffp-contract=off -fstack-usage -DCONFIG_ENABLE_CPX=1 \
              -Ifirmware/core -Ifirmware/app -isystem firmware/sdk $(FORMS_FLAGS)
 ARM_OBJ   := $(patsubst firmware/%.c,$(ARM)/%.o,$(SOURCES)) $(patsubst $(FORMS)/%.c,$(ARM)/forms/%.o,$(FORMS_SOURCES))

@@ -31,7 +31,7 @@ STACK_TOP = RAM + RAM_SIZE
 STOP = FLASH + FLASH_SIZE - 4
 WAIT_STATES = 5
 LINE = 16
-N_PHASES = 8
+N_PHASES = 9
 _PAINT = b"\xa5" * 8192
 _STATE_AT = 512  # in a slot, after the configuration
 

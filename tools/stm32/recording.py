@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 import ivl
-from ivl import native
+from ivl import forms, native
 
 GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
 VEHICLES = ("habas2021", "crazyflie21", "crazyflie21_brushless")
+_FORMS = ("polynomial2", "polynomial3", "bilinear")
+_GENERAL_SHARE = 0.5
 _ERROR_BYTES = 256
 _ROLLOUTS = 12  # of a batch, which has one vehicle, one gear and one set of parameters
 
@@ -52,11 +54,28 @@ def _fly(world: ivl.World, rng: np.random.Generator) -> int:
     """One batch with random approaches and policies; returns its ticks."""
     start = str(rng.choice(["imparted", "flown", "at_trigger"]))
     distance = rng.uniform(0.05, 0.6, _ROLLOUTS) if start == "at_trigger" else None
+    form = str(rng.choice(_FORMS)) if rng.random() < _GENERAL_SHARE else forms.PAPER
     outcomes = world.rollouts(
-        rng.uniform(1.0, 4.0, _ROLLOUTS), rng.uniform(20.0, 90.0, _ROLLOUTS), rng.uniform(1.0, 7.0, _ROLLOUTS),
-        rng.uniform(0.0, 12.0, _ROLLOUTS), seed=int(rng.integers(2**32)), start=start, d_ceil_m=distance, threads=1,
+        rng.uniform(1.0, 4.0, _ROLLOUTS), rng.uniform(20.0, 90.0, _ROLLOUTS), *_policies(form, rng), form=form,
+        seed=int(rng.integers(2**32)), start=start, d_ceil_m=distance, threads=1,
     )  # fmt: skip
     return int(outcomes.n_ticks.sum())
+
+
+def _policies(form: str, rng: np.random.Generator) -> list[np.ndarray]:
+    """Random numbers for each parameter of a form: most flip somewhere, a good part calls approaches off."""
+    if form == forms.PAPER:
+        return [rng.uniform(1.0, 7.0, _ROLLOUTS), rng.uniform(0.0, 12.0, _ROLLOUTS)]
+    return [_values(p.name, form, rng) for p in forms.by_name(form).params]
+
+
+def _values(name: str, form: str, rng: np.random.Generator) -> np.ndarray:
+    if name.startswith("r_"):
+        is_threshold = form == "bilinear" or name == "r_0_per_s"
+        return rng.uniform(1.0, 7.0, _ROLLOUTS) if is_threshold else rng.normal(0.0, 0.5, _ROLLOUTS)
+    if name.startswith("m_"):
+        return rng.uniform(0.0, 10.0, _ROLLOUTS) if name == "m_0_Nmm" else rng.normal(0.0, 0.3, _ROLLOUTS)
+    return rng.uniform(0.0, 1.0, _ROLLOUTS) if name == "go_p_min" else rng.normal(0.0, 2.0, _ROLLOUTS)
 
 
 def _overrides(rng: np.random.Generator) -> dict[str, float]:

@@ -25,7 +25,7 @@ PART_TICKS = 100_000  # recorded, replayed and thrown away together
 _CHUNK = 8192  # records
 _INIT, _COMMIT, _STEP = 1, 2, 3  # ivl_port_operation_t
 _TIMEOUT_S = 1200
-PHASES = ("idle", "ready", "approach", "flip", "coast", "attached", "done", "aborted")
+PHASES = ("idle", "ready", "approach", "flip", "coast", "attached", "done", "aborted", "level_out")
 
 
 @dataclass
