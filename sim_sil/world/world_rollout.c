@@ -9,6 +9,10 @@ static const char *const END_NAMES[] = {"contact_time", "missed",     "missed_ti
                                         "refused",      "not_finite", "step_limit",  "no_go"};
 _Static_assert(sizeof END_NAMES / sizeof END_NAMES[0] == IVL_SIM_END_COUNT, "a name for each end");
 
+// Outcomes are compared byte by byte: there must be none that no field owns.
+#define FIELD_SIZE(c_type, name, count, np, unit, lo, hi, dflt, doc) +sizeof(c_type) * (count)
+_Static_assert(sizeof(ivl_sim_outcome_t) == 0 IVL_SIM_OUTCOME_FIELDS(FIELD_SIZE), "a gap between two fields");
+
 static const double QUATERNION_SLACK = 1.0e-3;  // of the squared length of a stated attitude
 
 const char *ivl_sim_end_name(int end)
@@ -200,6 +204,7 @@ static void note_end(const ivl_sim_world_t *world, ivl_sim_end_t end, ivl_sim_ou
     const ivl_decision_t *decision = &world->firmware.decision;
     if (decision->made)
     {
+        o->decided[0] = 1;
         o->no_go[0] = decision->go ? 0 : 1;
         o->p_land[0] = (double)decision->p_land;
         o->d_decided_m[0] = (double)decision->d_ceil_m;

@@ -54,6 +54,7 @@ typedef enum
     X(int32_t, base_contact, 1, "i4", "1", 0, 1, 0, "1 if the base plate touched the ceiling") \
     X(int32_t, end_reason, 1, "i4", "1", 0, IVL_SIM_END_COUNT - 1, 0, "why the rollout ended") \
     X(int32_t, triggered, 1, "i4", "1", 0, 1, 0, "1 if the flip was started") \
+    X(int32_t, decided, 1, "i4", "1", 0, 1, 0, "1 if the policy was asked whether to go") \
     X(int32_t, no_go, 1, "i4", "1", 0, 1, 0, "1 if the policy called the approach off") \
     X(double, t_trigger_s, 1, "f8", "s", 0, 60, IVL_SIM_REQUIRED, "time of the trigger") \
     X(double, t_impact_s, 1, "f8", "s", 0, 60, IVL_SIM_REQUIRED, "time of the first contact") \

@@ -41,7 +41,7 @@ class Script:
         raise AssertionError(f"battery {battery_V}, needed {needed_V}")
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
-        assert resting.height_m < 0.2, "it stands on the floor"
+        assert resting.p_W_m[2] < 0.2, "it stands on the floor"
         self.asked.append(f"confirm {suggested.n_legs} {note}".strip())
         return suggested
 

@@ -21,9 +21,12 @@ from ivl.policy.region import BOX, PLANE, Region, Series
 from ivl.policy.shape import FloatArray, General, is_general
 from ivl.seeds import Purpose
 from ivl.sensing import APPROACHES
+from ivl.task import settings_of
 
 SHAPED = "region"
 """Name of the approach that leads into the region, where the flight core has it."""
+SHAPED_ROOM_M = 1.2
+"""A shaped approach begins at least so far below the ceiling: its ramp, and the distance of the trigger."""
 _SERIES = {"box": BOX, "plane": PLANE, "shaped": PLANE}
 
 
@@ -142,7 +145,8 @@ def _series(region: Region, seed: int) -> Series:
 
 
 def _shaped(task: PolicyTask) -> PolicyTask:
-    return task.model_copy(update={"approach": SHAPED})
+    room = settings_of({"start.room": SHAPED_ROOM_M}, "room for a shaped approach")
+    return task.model_copy(update={"approach": SHAPED, "overrides": {**room, **task.overrides}})
 
 
 def _rates(flown: Sequence[Outcomes]) -> Rates:

@@ -172,6 +172,7 @@ class Room:
             raise RolloutError(f"discarded by the operator{f' (aborted: {why})' if aborted else ''}")
         outcome = outcome_of_flight(recording, vehicle.snapshot(), seen.n_legs, seen.body_contact, resting, self._world)
         outcome["p_land"], outcome["d_decided_m"] = decision
+        outcome["decided"] = int(math.isfinite(decision[0]))
         if called_off is not None:
             note_no_go(outcome, called_off, self._world)
         return outcome, recording
