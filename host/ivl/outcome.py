@@ -77,6 +77,18 @@ def as_dict(outcome: Any, end_reason: str) -> dict[str, Any]:
     return result
 
 
+def verdict(outcome: Any) -> str:
+    """One outcome record in words: feet and contact, or why there was no flip and how far away the ceiling stayed."""
+    touched = bool(outcome["body_contact"] or outcome["base_contact"])
+    contact = ", body contact" if touched else ""
+    if outcome["no_go"]:
+        near = f"closest {1000 * float(outcome['d_min_m']):.0f} mm from the middle of the body to the ceiling"
+        return f"no_go: probability of a landing {float(outcome['p_land']):.2f}, {near}{contact}"
+    if not outcome["n_legs"]:
+        return f"no foot stuck{contact}"
+    return f"{int(outcome['n_legs'])} feet stuck{contact or ', clean'}"
+
+
 @cache
 def _invalid_codes() -> tuple[int, ...]:
     """Codes of `INVALID_ENDS` in the library."""
