@@ -1,6 +1,7 @@
 """Pictures of a policy for every approach: what they show is what the core decides and what was flown."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from ivl.policy.general import MapSettings
 from ivl.policy.region import BOX, PLANE, Approaches
 from ivl.policy.shape import General
 from ivl.policy.start import Map
+from ivl.policy.survey import Path as FlownPath
 from ivl.policy.survey import Survey, survey
 from ivl.world import Trace
 
@@ -212,6 +214,15 @@ def test_every_path_is_drawn_in_all_views(found: Survey) -> None:
     assert lower.get_xlabel().startswith("$d$")
 
 
+def test_an_approach_without_a_cue_is_told_not_drawn(found: Survey) -> None:
+    none = np.zeros(0)
+    blind = replace(found, paths=[*found.paths[:3], FlownPath(none, none, none, triggered=False, landed=False)])
+    n_seen = sum(len(path.d_ceil_m) > 0 for path in found.paths[:3])
+    figure = figure_of(policy_flow_space.draw, blind, [])
+    assert f"{n_seen} fresh approaches" in figure._suptitle.get_text()
+    assert f"{4 - n_seen} more begin too near for a cue" in figure._suptitle.get_text()
+
+
 # ---- go / no-go
 
 
@@ -260,7 +271,7 @@ def test_a_no_go_is_drawn_as_a_level_out(no_go: tuple[ivl.World, Trace]) -> None
     assert (left.get_title(), right.get_title()) == ("approach and rise", "level-out")
     text = figure._suptitle.get_text()
     assert "no_go" in text
-    assert f"{trace.outcome.p_land:.2f}" in text
+    assert ("below 0.01" if trace.outcome.p_land < 0.01 else f"{trace.outcome.p_land:.2f}") in text
     assert f"{1000 * trace.outcome.d_min_m:.0f} mm" in text
     labels = [entry.get_text() for entry in figure.legends[0].get_texts()]
     assert [label.split(",")[0] for label in labels] == ["no-go", "closest"]
@@ -280,8 +291,11 @@ def test_a_flight_that_goes_on_is_not_called_off() -> None:
 
 def test_the_verdict_says_what_happened(no_go: tuple[ivl.World, Trace]) -> None:
     record = no_go[1].outcome.copy()
-    near = f"closest {1000 * record.d_min_m:.0f} mm from the middle of the body to the ceiling"
-    assert verdict(record) == f"no_go: probability of a landing {record.p_land:.2f}, {near}"
+    record.p_land = 0.004
+    assert verdict(record).startswith("no_go at P below 0.01, closest ")
+    record.p_land = 0.234
+    near = f"closest {1000 * record.d_min_m:.0f} mm to the ceiling"
+    assert verdict(record) == f"no_go at P = 0.23, {near}"
     record.body_contact = 1
     assert verdict(record).endswith("ceiling, body contact")
     record.no_go, record.n_legs = 0, 4
@@ -353,6 +367,6 @@ def test_rollout_says_and_draws_a_no_go(path: Path, capsys: Capture) -> None:
     said = ["--speed", "0.8", "--angle", "85", "--plot", str(picture)]
     assert cli.run(["rollout", "--policy", str(path), *said, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["verdict"].startswith(f"no_go: probability of a landing {told['p_land']:.2f}, closest ")
+    assert told["verdict"].startswith("no_go at P ")
     assert f" {1000 * told['d_min_m']:.0f} mm " in told["verdict"]
     assert picture.stat().st_size > 10_000

@@ -214,7 +214,7 @@ def test_the_page_of_a_policy_shows_its_pictures_and_a_no_go(policy: Visit) -> N
     assert policy.page.locator("#numbers-table tbody tr").count() > 8
     assert policy.page.locator("#title-a").inner_text() == "landing"
     assert policy.page.locator("#title-b").inner_text() == "no-go"
-    assert policy.page.locator("#verdict-b").inner_text().startswith("no_go: probability of a landing 0.")
+    assert policy.page.locator("#verdict-b").inner_text().startswith("no_go at P ")
     assert policy.page.locator("#zero").inner_text() == "from the trigger (A), the no-go (B)"
 
 

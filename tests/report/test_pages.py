@@ -218,7 +218,7 @@ def test_the_flights_of_a_policy_are_flown_as_the_page_says(policy_page: Path) -
     assert (no_go["outcome"]["no_go"], no_go["outcome"]["n_legs"], no_go["outcome"]["t_trigger_s"]) == (1, 0, None)
     assert "level_out" in [name for _, name in no_go["phases"]]
     assert no_go["outcome"]["t_no_go_s"] in [t for t, _ in no_go["phases"]]
-    assert no_go["outcome"]["verdict"].startswith("no_go: ")
+    assert no_go["outcome"]["verdict"].startswith("no_go at P ")
     assert spared["spec"]["theta"] != no_go["spec"]["theta"]
     assert all(spared["spec"][n] == no_go["spec"][n] for n in ("speed_mps", "angle_deg", "seed", "stream"))
     assert spared["outcome"]["no_go"] == 0

@@ -50,8 +50,10 @@ def draw(found: Survey, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pat
     for axis, (i, j) in zip(figure.subplots(2, 1), ((0, 1), (2, 1)), strict=True):
         _draw_plane(axis, found, mesh, good, limits, i, j)
     figure.legend(handles=_handles(), loc="lower left", ncols=2, fontsize=style.SMALL, frameon=False)
+    seen = [path for path in found.paths if len(path.d_ceil_m)]
+    near = f", {len(found.paths) - len(seen)} more begin too near for a cue" if len(seen) < len(found.paths) else ""
     figure.suptitle(
-        f"{found.general.form.name}: {len(found.paths)} fresh approaches, as sensed, up to the trigger",
+        f"{found.general.form.name}: {len(seen)} fresh approaches, as sensed, up to the trigger{near}",
         fontsize=style.NORMAL,
     )
     return style.save(figure, paths, dpi)
@@ -75,7 +77,7 @@ def _draw_plane(
     for path in found.paths:
         points, color = _points(path), _COLORS[_kind(path)]
         axis.plot(points[:, i], points[:, j], color=color, linewidth=0.6)
-        axis.plot(points[-1, i], points[-1, j], ".", color=color, markersize=4)
+        axis.plot(points[-1:, i], points[-1:, j], ".", color=color, markersize=4)
     for line in mesh[:: _N_LINES // 4]:  # lines of equal speed on the surface
         axis.plot(line[:, i], line[:, j], color=style.GREEN, linewidth=1.0, zorder=3)
     axis.set_xlim(*limits[i])

@@ -29,6 +29,8 @@ _TRACE_PERIOD_S = 0.002
 class Path:
     """One approach as the flight core senses it, up to its trigger (or its last valid cue before any contact).
 
+    It has no points if it begins so near that there is no cue before it ends.
+
     Attributes:
         rrev_per_s: RREV, shape (n,).
         of_y_radps: OF_y, shape (n,).

@@ -91,7 +91,7 @@ class Replay {
     part("title").textContent = label;
     part("verdict").textContent = outcome.verdict;
     part("verdict").className = `verdict ${outcome.clean ? "good" : outcome.four_leg || outcome.no_go ? "fair" : "bad"}`;
-    part("spec").textContent = `V ${spec.speed_mps} m/s, φ ${spec.angle_deg}°, ${shown(this.data.parameters).map(([symbol, unit], i) => `${symbol} ${spec.theta[i].toFixed(3)} ${unit}`).join(", ")}`;
+    part("spec").textContent = `V ${Number(spec.speed_mps.toFixed(3))} m/s, φ ${Number(spec.angle_deg.toFixed(2))}°, ${shown(this.data.parameters).map(([symbol, unit], i) => `${symbol} ${spec.theta[i].toFixed(3)} ${unit}`).join(", ")}`;
     const offset = this.data.geometry[pane.landing.geometry].sensed_gap_offset;
     this.root.querySelector("#offset").textContent = offset ? `d sensed counts to a plane ${(1000 * offset).toFixed(0)} mm behind the ceiling.` : "";
     pane.canvas.setAttribute("aria-label", `Landing ${pane.name.toUpperCase()}: ${label}, ${part("verdict").textContent}. Arrow keys turn the view, plus and minus zoom.`);
