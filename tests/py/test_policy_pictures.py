@@ -26,6 +26,7 @@ from ivl.policy.shape import General
 from ivl.policy.start import Map
 from ivl.policy.survey import Path as FlownPath
 from ivl.policy.survey import Survey, survey
+from ivl.task import settings_of
 from ivl.world import Trace
 
 Capture = pytest.CaptureFixture[str]
@@ -173,6 +174,17 @@ def test_level_policies_of_the_map_are_the_paper_s(found: Survey) -> None:
     )
     for name in ("n_legs", "t_trigger_s", "t_impact_s", "body_contact"):
         assert np.array_equal(one[name], other[name], equal_nan=one[name].dtype.kind == "f")
+
+
+def test_flights_of_two_tasks_count_both() -> None:
+    late = TASK.model_copy(update={"overrides": settings_of({"sense.latency": 0.05}, "test")})
+    policy = file.make(GENERAL.form, policies.good_theta(), [TASK, late], None, None)
+    both = survey(policy, 30, seed=5, grid=GRID)
+    own, other = both.by_policy
+    assert four_leg(other).mean() < four_leg(own).mean()
+    assert both.rates([own, other]) == pytest.approx(0.5 * (both.rates([own]) + both.rates([other])), nan_ok=True)
+    p, _ = both.decided()
+    assert len(p) == sum(go.has_decided(outcomes).sum() for outcomes in both.by_policy)
 
 
 # ---- the flow space

@@ -17,6 +17,7 @@ import pytest
 from ivl import cli, report
 from ivl.errors import ConfigError, StoreError
 from ivl.policy import assess, file
+from ivl.policy.shape import General
 from ivl.report.landings import thinned
 from ivl.report.page import encode
 from ivl.sweep import store
@@ -239,3 +240,13 @@ def test_a_page_of_a_policy_that_cannot_be_written_is_named(tmp_path: Path, caps
         cli.run(["policy", "report", str(tmp_path / "g.yaml"), "--out", str(tmp_path / "p.html"), "--rrev", "4"]) == 2
     )
     assert "--moment is missing" in capsys.readouterr().err
+
+
+def test_a_policy_that_refuses_nothing_has_a_page_without_a_no_go(tmp_path: Path) -> None:
+    theta = General("polynomial2").always_go(policies.good_theta())
+    file.save(file.make(General("polynomial2").form, theta, [policies.TASK], None, None), tmp_path / "g.yaml")
+    page = tmp_path / "page.html"
+    assert cli.run(["policy", "report", str(tmp_path / "g.yaml"), "--out", str(page), "--approaches", "6"]) == 0
+    data = carried(page)
+    assert [entry["what"] for entry in data["policy"]["notable"]] == ["landing"]
+    assert data["landings"][0]["outcome"]["four_leg"]
