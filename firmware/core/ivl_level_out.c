@@ -39,7 +39,9 @@ bool ivl_level_out_is_last(const ivl_cfg_t *cfg, const ivl_state_t *state, const
 
 bool ivl_level_out_asked(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 {
-    return !state->decision.made && (state->action.flip || ivl_level_out_is_last(cfg, state, seen));
+    // a policy says nothing while the ceiling does not come closer
+    const bool closing = seen->cues.rrev_per_s > 0.0f;
+    return closing && !state->decision.made && (state->action.flip || ivl_level_out_is_last(cfg, state, seen));
 }
 
 void ivl_level_out_begin(ivl_state_t *state)
