@@ -66,6 +66,10 @@ static void random_state(rng_t *rng, ivl_state_t *state, ivl_seen_t *seen)
     seen->ceiling.valid = !seldom(rng);
     seen->ceiling.d_ceil_m = seldom(rng) ? 0.0f : 1.0f;
     seen->cues.valid = !seldom(rng);
+    seen->cues.rrev_per_s = seldom(rng) ? 0.0f : 1.0f;
+    state->action.flip = rng_below(rng, 2u) == 0u;
+    state->action.go = !seldom(rng);
+    state->decision.made = seldom(rng);
 }
 
 static void test_the_search_finds_what_a_scan_of_all_rows_finds_in_every_phase(void)
