@@ -36,7 +36,7 @@ static void estimate(ivl_cf_t *cf, const ivl_in_t *before)
         cf->sensed.p_WB_m = before->p_WB_m;
         cf->sensed.v_WB_mps = before->v_WB_mps;
     }
-    else if (cf->set.pose_source != 0u)
+    else if (cf->set.sim.pose_source != 0u)
     {
         ivl_cf_estimate_fill(&cf->estimate, (float)cf->model.tick_s, &cf->sensed);
     }
@@ -74,7 +74,7 @@ void ivl_cf_sense(ivl_cf_t *cf, const ivl_in_t *in)
     filter_force(cf);
     if (cf->has_range)
     {
-        cf->range_up_mm = (uint16_t)ivl_sim_sdk_range_mm(&cf->sensed.range);
+        cf->range_mm[IVL_CF_UP] = (uint16_t)ivl_sim_sdk_range_mm(&cf->sensed.range);
     }
     if (cf->model.has_readings)
     {

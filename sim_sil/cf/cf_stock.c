@@ -49,16 +49,17 @@ static void want_heading(ivl_cf_stock_t *stock, const ivl_sample_t *now, const i
 
 static void want_tilt(ivl_cf_stock_t *stock, const ivl_cf_setpoint_t *sp, float dt_s)
 {
-    const bool rates = sp->tilt == IVL_CF_MODE_VELOCITY;
-    stock->roll = ivl_clamp(rates ? stock->roll + sp->roll * dt_s : sp->roll, -TILT_RAD_MAX, TILT_RAD_MAX);
-    stock->pitch = ivl_clamp(rates ? stock->pitch + sp->pitch * dt_s : sp->pitch, -TILT_RAD_MAX, TILT_RAD_MAX);
+    const bool roll_turns = sp->roll_mode == IVL_CF_MODE_VELOCITY, pitch_turns = sp->pitch_mode == IVL_CF_MODE_VELOCITY;
+    stock->roll = ivl_clamp(roll_turns ? stock->roll + sp->roll * dt_s : sp->roll, -TILT_RAD_MAX, TILT_RAD_MAX);
+    stock->pitch = ivl_clamp(pitch_turns ? stock->pitch + sp->pitch * dt_s : sp->pitch, -TILT_RAD_MAX, TILT_RAD_MAX);
 }
 
 /// Horizontal part of the reference, in W.
 static void want_xy(ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sample_t *now, const ivl_cf_setpoint_t *sp, float dt_s,
                     ivl_reference_t *ref)
 {
-    const ivl_sincos_t heading = ivl_sincos(stock->yaw_rad);
+    // sticks and body axes are those of the vehicle, wherever it has come on its way to the wanted heading
+    const ivl_sincos_t heading = ivl_sincos(ivl_cf_yaw_of(now->q_WB));
     if (sp->xy == IVL_CF_MODE_OFF)
     {
         // no error of position and velocity, and the acceleration that this tilt makes

@@ -48,11 +48,13 @@ class Chosen:
         given: Fields of the task by name; those of which nothing was said are left out.
         settings: Texts of `--set`.
         path: Experiment that all else changes, if one was named.
+        defaults: Fields whose defaults differ from the task's for this command.
     """
 
     given: dict[str, Any] = field(default_factory=dict)
     settings: list[str] = field(default_factory=list)
     path: str | None = None
+    defaults: dict[str, Any] = field(default_factory=dict)
 
     def fields(self) -> dict[str, Any]:
         """Fields of the task as raw data: those of the experiment, or the defaults, and what was said.
@@ -66,7 +68,7 @@ class Chosen:
                 raise ConfigError(f"--set {setting}: {FLAGS[name][0]} says it, too")
         if self.path is not None:
             return experiment.load(self.path, self.settings).task() | self.given
-        data = {name: default_of(name) for name in ("vehicle", "gear")}
+        data = {name: default_of(name) for name in ("vehicle", "gear")} | self.defaults
         for setting in self.settings:
             apply_setting(data, setting, Task, _LABEL)
         return data | self.given
@@ -79,12 +81,17 @@ class Chosen:
         return setup.world_of(gear)
 
 
-def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
-    """Give a command the options of some fields, `--experiment` and `--set`, instead of its parameter `chosen`."""
+def task_options(*names: str, **defaults: Any) -> Callable[[Callable[..., Result]], Callable[..., Result]]:
+    """Give a command the options of some fields, `--experiment` and `--set`, instead of its parameter `chosen`.
+
+    Args:
+        names: Fields of the task.
+        defaults: What the command takes for a field that nobody names, where that is not the task's own default.
+    """
 
     def give(command: Callable[..., Result]) -> Callable[..., Result]:
         own = inspect.signature(command, eval_str=True)
-        options = [*(_option(name) for name in names), *_general()]
+        options = [*(_option(name, defaults.get(name, default_of(name))) for name in names), *_general()]
         kept = [parameter for parameter in own.parameters.values() if parameter.name != "chosen"]
 
         @wraps(command)
@@ -92,7 +99,7 @@ def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[...,
             said = {name: arguments.pop(name) for name in (*names, "experiment", "settings")}
             path, settings = said.pop("experiment"), said.pop("settings")
             given = {name: value for name, value in said.items() if value is not None}
-            return command(chosen=Chosen(given, settings or [], path), **arguments)
+            return command(chosen=Chosen(given, settings or [], path, defaults), **arguments)
 
         first = [p for p in kept if p.default is inspect.Parameter.empty]
         rest = [p for p in kept if p.default is not inspect.Parameter.empty]
@@ -104,10 +111,9 @@ def task_options(*names: str) -> Callable[[Callable[..., Result]], Callable[...,
     return give
 
 
-def _option(name: str) -> inspect.Parameter:
+def _option(name: str, default: Any) -> inspect.Parameter:
     kind = _KINDS.get(name, str)
     text = Task.model_fields[name].description
-    default = default_of(name)
     shown = f"{text}  [default: {default}]" if isinstance(default, str) else text
     return _parameter(name, Annotated[kind | None, typer.Option(*FLAGS[name], help=shown)])
 
