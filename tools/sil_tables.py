@@ -1,6 +1,6 @@
 """Write docs/SIL_TABLES.md from what the software vehicle serves; with --check say whether the page is up to date.
 
-The program `ivl_sil --tables` prints its own tables (sim_sil/cf/cf_names.h), so that the page cannot list anything else.
+The program `ivl_sil --tables` prints its own tables (sim_sil/cf/cf_names.h): the page cannot list anything else.
 """
 
 import subprocess

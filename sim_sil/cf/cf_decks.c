@@ -99,7 +99,7 @@ static void range(ivl_cf_t *cf)
 
 static int16_t pixels(double n)
 {
-    return (int16_t)((n > 32767.0) ? 32767.0 : ((n < -32767.0) ? -32767.0 : n));
+    return (int16_t)((n > -32767.0) ? ((n < 32767.0) ? n : 32767.0) : -32767.0);
 }
 
 /// Pixels that the floor has moved by since the last time: as the firmware's filter expects them of the true motion, in the sensor's own axes.

@@ -200,7 +200,8 @@ static const uint8_t FLOW_MOVES = 0xB0, FLOW_QUALITY = 100;
 
 static int16_t whole(float value)
 {
-    return (int16_t)ivl_clamp(value, -32768.0f, 32767.0f);
+    // what is no number becomes the lower end
+    return (int16_t)((value > -32768.0f) ? ((value < 32767.0f) ? value : 32767.0f) : -32768.0f);
 }
 
 static int16_t milli(float value)
@@ -233,8 +234,8 @@ static uint32_t packed(ivl_quat_t q_WB)
         if (i != largest)
         {
             const bool     is_negative = (q[i] < 0.0f) != (q[largest] < 0.0f);
-            const uint32_t size = (uint32_t)(fabsf(q[i]) / 0.70710678f * 511.0f + 0.5f);
-            bits = bits << 10 | (is_negative ? 0x200u : 0u) | ((size < 511u) ? size : 511u);
+            const float    size = fabsf(q[i]) / 0.70710678f * 511.0f + 0.5f;
+            bits = bits << 10 | (is_negative ? 0x200u : 0u) | ((size < 511.0f) ? (uint32_t)size : 511u);
         }
     }
     return bits;

@@ -100,6 +100,7 @@ void ivl_cf_world_place(ivl_cf_t *cf)
     start(cf, FLOOR_Z_M);
     place_on_floor(cf, kin.p_WB_m[0], kin.p_WB_m[1], level);
     memset(ivl_cf_world(cf)->rotor.speed_radps, 0, sizeof ivl_cf_world(cf)->rotor.speed_radps);
+    (void)ivl_cf_supervisor_arm(&cf->supervisor, false);
     ivl_cf_planner_stop(&cf->planner);
     ivl_cf_commander_relax(&cf->commander);
     ivl_cf_stock_reset(&cf->stock);

@@ -78,7 +78,7 @@ struct ivl_crtp
     bool              is_off;          ///< the vehicle has no power
     bool              ends_with_zero;  ///< the last command of the client was a set-point of zeros
     bool              holds_zero;      ///< it waits whether the client stays
-    uint64_t          zero_until_ms;
+    uint64_t          zero_until_ms;   ///< when it acts all the same, or, having acted, is handed back
     const uint8_t    *phase, *ended;
     uint8_t           last_phase, last_ended;
     bool              is_held;  ///< the answer to run_to_ms waits until it is reached

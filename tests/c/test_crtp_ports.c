@@ -193,6 +193,33 @@ static void test_zeros_that_wait_are_dropped_with_their_client_and_act_if_he_sta
     TEST_ASSERT_EQUAL_STRING("rpyt 0 0 0 0", fake_said);
 }
 
+static void test_zeros_that_nothing_follows_are_handed_back_before_they_are_old(void)
+{
+    expect_said(ZERO, "rpyt 0 0 0 0");
+    for (int ms = 0; ms < 399; ms++)
+    {
+        ivl_crtp_step(&server);
+    }
+    hear("fc00");
+    TEST_ASSERT_EQUAL_STRING("rpyt 0 0 0 0", fake_said);
+    for (int ms = 0; ms < 2000; ms++)
+    {
+        ivl_crtp_step(&server);
+    }
+    TEST_ASSERT_EQUAL_STRING("rpyt 0 0 0 0; notify_stop 0", fake_said);
+    // a stream of them is somebody's
+    for (int i = 0; i < 10; i++)
+    {
+        hear(ZERO);
+        forget();
+        for (int ms = 0; ms < 390; ms++)
+        {
+            ivl_crtp_step(&server);
+        }
+        TEST_ASSERT_EQUAL_STRING("", fake_said);
+    }
+}
+
 static void test_a_client_that_ends_with_zeros_hands_back(void)
 {
     expect_said(ZERO, "rpyt 0 0 0 0");
@@ -452,6 +479,7 @@ int main(void)
     RUN_TEST(test_older_setpoints_and_those_of_a_radio_control);
     RUN_TEST(test_zeros_act_at_once_unless_the_vehicle_flies_on_by_itself);
     RUN_TEST(test_zeros_that_wait_are_dropped_with_their_client_and_act_if_he_stays);
+    RUN_TEST(test_zeros_that_nothing_follows_are_handed_back_before_they_are_old);
     RUN_TEST(test_a_client_that_ends_with_zeros_hands_back);
     RUN_TEST(test_power_packets_switch_the_vehicle_and_are_always_acknowledged);
     RUN_TEST(test_stored_values_are_in_force_after_power_on);

@@ -72,7 +72,8 @@ def sil(
     )
     if world.params.values["aero.yaw_torque"] == 0.0:
         console.err.print(
-            f"{world.vehicle} cannot turn: its aero.yaw_torque is 0, so that yaw commands change nothing", soft_wrap=True
+            f"{world.vehicle} cannot turn: its aero.yaw_torque is 0, so that yaw commands change nothing",
+            soft_wrap=True,
         )
     _become(command, text)
 
