@@ -158,39 +158,8 @@ static uint8_t *flag_of(ivl_cf_t *cf, size_t deck)
     return (deck == 0) ? &cf->set.has_flow_deck : &cf->set.has_ranger_deck;
 }
 
-/// Its number, or IVL_CF_DECKS.
-static size_t number_of(const char *name)
-{
-    size_t i = 0;
-    while (i < IVL_CF_DECKS && strcmp(DECKS[i].name, name) != 0)
-    {
-        i++;
-    }
-    return i;
-}
-
-bool ivl_cf_is_deck(const char *name)
-{
-    return number_of(name) < IVL_CF_DECKS;
-}
-
-bool ivl_cf_attach(ivl_cf_t *cf, const char *name)
-{
-    const size_t deck = number_of(name);
-    if (deck < IVL_CF_DECKS)
-    {
-        *flag_of(cf, deck) = 1;
-    }
-    return deck < IVL_CF_DECKS;
-}
-
-bool ivl_cf_has_deck(const ivl_cf_t *cf, size_t deck)
-{
-    return ((deck == 0) ? cf->set.has_flow_deck : cf->set.has_ranger_deck) != 0u;
-}
-
 /// A head with maker and product, then the name and the revision as text, each part with the last byte of its CRC-32.
-void ivl_cf_deck_memory(size_t deck, uint8_t bytes[IVL_CF_ONE_WIRE_BYTES])
+static void write_memory(size_t deck, uint8_t bytes[IVL_CF_ONE_WIRE_BYTES])
 {
     enum
     {
@@ -214,4 +183,36 @@ void ivl_cf_deck_memory(size_t deck, uint8_t bytes[IVL_CF_ONE_WIRE_BYTES])
     *at++ = 1;
     *at++ = 'A';
     *at = (uint8_t)ivl_wire_crc(0, bytes + HEAD, (size_t)(at - bytes) - HEAD);
+}
+
+/// Its number, or IVL_CF_DECKS.
+static size_t number_of(const char *name)
+{
+    size_t i = 0;
+    while (i < IVL_CF_DECKS && strcmp(DECKS[i].name, name) != 0)
+    {
+        i++;
+    }
+    return i;
+}
+
+bool ivl_cf_is_deck(const char *name)
+{
+    return number_of(name) < IVL_CF_DECKS;
+}
+
+bool ivl_cf_attach(ivl_cf_t *cf, const char *name)
+{
+    const size_t deck = number_of(name);
+    if (deck < IVL_CF_DECKS)
+    {
+        *flag_of(cf, deck) = 1;
+        write_memory(deck, cf->one_wire[deck]);
+    }
+    return deck < IVL_CF_DECKS;
+}
+
+bool ivl_cf_has_deck(const ivl_cf_t *cf, size_t deck)
+{
+    return ((deck == 0) ? cf->set.has_flow_deck : cf->set.has_ranger_deck) != 0u;
 }

@@ -170,21 +170,24 @@ static uint32_t one_wire_size(void)
     return IVL_CF_ONE_WIRE_BYTES;
 }
 
-static bool one_wire_read(size_t deck, uint32_t address, uint32_t size, uint8_t *bytes)
-{
-    uint8_t all[IVL_CF_ONE_WIRE_BYTES];
-    ivl_cf_deck_memory(deck, all);
-    return copy(all, sizeof all, address, size, bytes);
-}
-
 static bool one_wire_read_0(uint32_t address, uint32_t size, uint8_t *bytes)
 {
-    return one_wire_read(0, address, size, bytes);
+    return copy(THE.one_wire[0], IVL_CF_ONE_WIRE_BYTES, address, size, bytes);
+}
+
+static bool one_wire_write_0(uint32_t address, uint32_t size, const uint8_t *bytes)
+{
+    return put(THE.one_wire[0], IVL_CF_ONE_WIRE_BYTES, address, size, bytes);
 }
 
 static bool one_wire_read_1(uint32_t address, uint32_t size, uint8_t *bytes)
 {
-    return one_wire_read(1, address, size, bytes);
+    return copy(THE.one_wire[1], IVL_CF_ONE_WIRE_BYTES, address, size, bytes);
+}
+
+static bool one_wire_write_1(uint32_t address, uint32_t size, const uint8_t *bytes)
+{
+    return put(THE.one_wire[1], IVL_CF_ONE_WIRE_BYTES, address, size, bytes);
 }
 
 // ---- all of them
@@ -196,8 +199,16 @@ const ivl_cf_memory_t *ivl_cf_memories(const ivl_cf_t *cf, size_t *n)
         COMMON = 7
     };
     static const ivl_cf_memory_t ONE_WIRE[IVL_CF_DECKS] = {
-        {.type = TYPE_ONE_WIRE, .size = one_wire_size, .read = one_wire_read_0, .serial = {0x0D, 0, 0, 0, 0, 0, 0, 1}},
-        {.type = TYPE_ONE_WIRE, .size = one_wire_size, .read = one_wire_read_1, .serial = {0x0D, 0, 0, 0, 0, 0, 0, 2}},
+        {.type = TYPE_ONE_WIRE,
+         .size = one_wire_size,
+         .read = one_wire_read_0,
+         .write = one_wire_write_0,
+         .serial = {0x0D, 0, 0, 0, 0, 0, 0, 1}},
+        {.type = TYPE_ONE_WIRE,
+         .size = one_wire_size,
+         .read = one_wire_read_1,
+         .write = one_wire_write_1,
+         .serial = {0x0D, 0, 0, 0, 0, 0, 0, 2}},
     };
     static ivl_cf_memory_t memories[COMMON + IVL_CF_DECKS] = {
         [1] = {.type = IVL_CF_MEMORY_OUTCOME, .size = outcome_size, .read = outcome_read},

@@ -233,8 +233,8 @@ static uint32_t packed(ivl_quat_t q_WB)
     {
         if (i != largest)
         {
-            const bool     is_negative = (q[i] < 0.0f) != (q[largest] < 0.0f);
-            const float    size = fabsf(q[i]) / 0.70710678f * 511.0f + 0.5f;
+            const bool  is_negative = (q[i] < 0.0f) != (q[largest] < 0.0f);
+            const float size = fabsf(q[i]) / 0.70710678f * 511.0f + 0.5f;
             bits = bits << 10 | (is_negative ? 0x200u : 0u) | ((size < 511.0f) ? (uint32_t)size : 511u);
         }
     }

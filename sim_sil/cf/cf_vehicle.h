@@ -149,6 +149,8 @@ struct ivl_cf
     uint16_t            range_next_mm[IVL_CF_DIRECTIONS];  ///< measured, not yet told
     int16_t             flow_pixels[2];                    ///< deltaX, deltaY of the flow sensor
     uint8_t             eeprom[IVL_CF_EEPROM_BYTES];
+    uint8_t             one_wire[IVL_CF_DECKS][IVL_CF_ONE_WIRE_BYTES];  ///< of the decks that are on
+    uint8_t             one_wire[IVL_CF_DECKS][IVL_CF_ONE_WIRE_BYTES];
     uint32_t            tester_errors;  ///< bytes written to the memory tester that were not those it expects
     ivl_cf_text_t       text;
     ivl_cf_packets_t    to_app, from_app;
@@ -204,9 +206,6 @@ void ivl_cf_decks_boot(ivl_cf_t *cf);
 /// What is measured on the decks, a millisecond after the one before.
 void ivl_cf_decks_step(ivl_cf_t *cf);
 bool ivl_cf_has_deck(const ivl_cf_t *cf, size_t deck);
-
-/// The 1-wire memory of a deck.
-void ivl_cf_deck_memory(size_t deck, uint8_t bytes[IVL_CF_ONE_WIRE_BYTES]);
 
 // ---- cf_memories.c
 

@@ -812,7 +812,7 @@ static void test_memories_that_every_crazyflie_has(void)
     TEST_ASSERT_TRUE(m->read(0, 257, bytes));
     TEST_ASSERT_EQUAL_HEX8(3, bytes[0]);
     TEST_ASSERT_EACH_EQUAL_HEX8(0, bytes + 1, 256);
-    // one 1-wire memory a deck
+    // one 1-wire memory a deck, which can be written
     TEST_ASSERT_NULL(memory_of(0x01, 0));
     TEST_ASSERT_TRUE(ivl_cf_attach(vehicle, "bcMultiranger") && ivl_cf_attach(vehicle, "bcFlow2"));
     m = memory_of(0x01, 1);
