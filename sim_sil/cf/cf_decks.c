@@ -55,7 +55,11 @@ static uint16_t look(const ivl_cf_t *cf, const double p_W_m[3], const double b_W
             nearer(walls_m[i] + p_W_m[i], -b_W[i], &nearest_m);
         }
     }
-    return (nearest_m < none_m) ? (uint16_t)(nearest_m * 1000.0 + 0.5) : NOTHING_MM;
+    if (nearest_m < none_m)
+    {
+        return (uint16_t)(nearest_m * 1000.0 + 0.5);
+    }
+    return NOTHING_MM;
 }
 
 static uint16_t measure(const ivl_cf_t *cf, ivl_cf_direction_t direction)

@@ -150,7 +150,6 @@ struct ivl_cf
     int16_t             flow_pixels[2];                    ///< deltaX, deltaY of the flow sensor
     uint8_t             eeprom[IVL_CF_EEPROM_BYTES];
     uint8_t             one_wire[IVL_CF_DECKS][IVL_CF_ONE_WIRE_BYTES];  ///< of the decks that are on
-    uint8_t             one_wire[IVL_CF_DECKS][IVL_CF_ONE_WIRE_BYTES];
     uint32_t            tester_errors;  ///< bytes written to the memory tester that were not those it expects
     ivl_cf_text_t       text;
     ivl_cf_packets_t    to_app, from_app;
