@@ -85,6 +85,7 @@ static void boot(ivl_cf_t *cf)
     cf->commander.setpoint.t_ms = ivl_cf_now_ms(cf);
     ivl_cf_planner_init(&cf->planner);
     ivl_cf_estimate_reset(&cf->estimate);
+    cf->frame = (ivl_cf_frame_t){.is_other = false};
     ivl_cf_stock_reset(&cf->stock);
     ivl_cf_decks_boot(cf);
     cf->runs_stock = false;

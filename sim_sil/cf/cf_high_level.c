@@ -114,6 +114,7 @@ int ivl_cf_hl_stop(ivl_cf_t *cf)
 
 int ivl_cf_hl_go_to(ivl_cf_t *cf, bool relative, bool linear, const float p_W_m[3], float yaw_rad, float duration_s)
 {
+    ivl_cf_planner_catch_up(&cf->planner, ivl_cf_now_ms(cf));
     const ivl_cf_goal_t *last = &cf->planner.last;
     const ivl_vec3_t     asked = {p_W_m[0], p_W_m[1], p_W_m[2]};
     const ivl_vec3_t     p = relative ? ivl_add(last->p_W_m, asked) : asked;

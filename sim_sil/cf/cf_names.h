@@ -65,6 +65,10 @@
     LIVE(U16, motorPowerSet, m3,     C, THE.set.bypass_pwm[2], NULL) \
     LIVE(U16, motorPowerSet, m4,     C, THE.set.bypass_pwm[3], NULL) \
     LIVE(U8,  kalman, resetEstimation, C, THE.set.reset_estimation, estimation_written) \
+    LIVE(F32, kalman, initialX,   C, THE.set.initial_m[0], NULL) \
+    LIVE(F32, kalman, initialY,   C, THE.set.initial_m[1], NULL) \
+    LIVE(F32, kalman, initialZ,   C, THE.set.initial_m[2], NULL) \
+    LIVE(F32, kalman, initialYaw, C, THE.set.initial_yaw_rad, NULL) \
     LIVE(F32, locSrv, extPosStdDev,    C, THE.set.ext_pos_sigma_m, NULL) \
     HELD(F32, locSrv, extQuatStdDev,   C, 4.5e-3f) \
     LIVE(U8,  memTst, resetW,   N, THE.set.tester_reset, NULL) \
@@ -89,10 +93,6 @@
     HELD(F32, kalman, mNBaro,   CP, 2.0f) \
     HELD(F32, kalman, mNGyro_rollpitch, CP, 0.1f) \
     HELD(F32, kalman, mNGyro_yaw,       CP, 0.1f) \
-    HELD(F32, kalman, initialX,   C, 0.0f) \
-    HELD(F32, kalman, initialY,   C, 0.0f) \
-    HELD(F32, kalman, initialZ,   C, 0.0f) \
-    HELD(F32, kalman, initialYaw, C, 0.0f) \
     HELD(F32, kalman, dragB_x, CP, 0.0f) \
     HELD(F32, kalman, dragB_y, CP, 0.0f) \
     HELD(F32, kalman, dragB_z, CP, 0.0f) \

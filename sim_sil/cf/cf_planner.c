@@ -280,6 +280,15 @@ bool ivl_cf_planner_start(ivl_cf_planner_t *planner, uint8_t id, const ivl_cf_st
     return true;
 }
 
+void ivl_cf_planner_catch_up(ivl_cf_planner_t *planner, uint32_t now_ms)
+{
+    ivl_cf_goal_t goal;
+    if (!ivl_cf_planner_rests(planner) && goal_at(planner, now_ms, &goal))
+    {
+        planner->last = goal;
+    }
+}
+
 // ---- set-points
 
 bool ivl_cf_planner_next(ivl_cf_planner_t *planner, uint32_t now_ms, ivl_cf_setpoint_t *setpoint)

@@ -51,6 +51,9 @@ void ivl_cf_planner_hover(ivl_cf_planner_t *planner, ivl_vec3_t p_W_m, float yaw
 /// Where the vehicle is: the next way begins there.
 void ivl_cf_planner_tell(ivl_cf_planner_t *planner, ivl_vec3_t p_W_m, ivl_vec3_t v_W_mps, float yaw_rad);
 
+/// The goal of this very moment is the last one; set-points are made less often.  Where no way is followed, nothing changes.
+void ivl_cf_planner_catch_up(ivl_cf_planner_t *planner, uint32_t now_ms);
+
 /// No way is followed: STOPPED or DISABLED.
 bool ivl_cf_planner_rests(const ivl_cf_planner_t *planner);
 

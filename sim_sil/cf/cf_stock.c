@@ -12,6 +12,8 @@ static const float LEAD_M = 0.3f;
 static const float LEAD_RAD = 1.0f;
 static const float TILT_RAD_MAX = 0.9f;
 static const float PI_F = 3.14159265f;
+// A way of a few hundredths of a second asks for tens of g, which no vehicle follows: more than this of an acceleration is left out.
+static const float ACCEL_MPS2_MAX = 5.0f;
 
 void ivl_cf_stock_reset(ivl_cf_stock_t *stock)
 {
@@ -54,6 +56,12 @@ static void want_tilt(ivl_cf_stock_t *stock, const ivl_cf_setpoint_t *sp, float 
     stock->pitch = ivl_clamp(pitch_turns ? stock->pitch + sp->pitch * dt_s : sp->pitch, -TILT_RAD_MAX, TILT_RAD_MAX);
 }
 
+static ivl_vec3_t limited(ivl_vec3_t a)
+{
+    return ivl_vec3(ivl_clamp(a.x, -ACCEL_MPS2_MAX, ACCEL_MPS2_MAX), ivl_clamp(a.y, -ACCEL_MPS2_MAX, ACCEL_MPS2_MAX),
+                    ivl_clamp(a.z, -ACCEL_MPS2_MAX, ACCEL_MPS2_MAX));
+}
+
 /// Horizontal part of the reference, in W.
 static void want_xy(ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sample_t *now, const ivl_cf_setpoint_t *sp, float dt_s,
                     ivl_reference_t *ref)
@@ -73,7 +81,7 @@ static void want_xy(ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sampl
     if (sp->xy == IVL_CF_MODE_ABS)
     {
         stock->p_W_m.x = sp->p_W_m.x, stock->p_W_m.y = sp->p_W_m.y;
-        ref->a_W_mps2 = sp->a_W_mps2;
+        ref->a_W_mps2 = limited(sp->a_W_mps2);
         return;
     }
     stock->p_W_m.x = drawn_along(stock->p_W_m.x, ref->v_W_mps.x, dt_s, now->p_WB_m.x);
@@ -92,7 +100,7 @@ static void want_z(ivl_cf_stock_t *stock, const ivl_sample_t *now, const ivl_cf_
     {
         stock->p_W_m.z = sp->p_W_m.z;
         ref->v_W_mps.z = sp->v_mps.z;
-        ref->a_W_mps2.z = sp->a_W_mps2.z;
+        ref->a_W_mps2.z = limited(sp->a_W_mps2).z;
     }
     else
     {

@@ -90,7 +90,7 @@ static void estimation_written(void)
     if (THE.set.reset_estimation != 0u)
     {
         THE.set.reset_estimation = 0;
-        ivl_cf_estimate_reset(&THE.estimate);
+        ivl_cf_begin_estimate(&THE);
         ivl_cf_param_changed(&THE, &THE.set.reset_estimation);
     }
 }

@@ -57,6 +57,7 @@ typedef struct
     float               takeoff_mps, landing_mps;
     ivl_cf_cppm_t       cppm;
     float               ext_pos_sigma_m;
+    float               initial_m[3], initial_yaw_rad;  ///< where the estimate begins after a reset
     uint8_t             reset_estimation, prop_test, battery_test;
     uint8_t             task_dump, assert_info, storage_stats, tester_reset;
     uint8_t             high_level;
@@ -132,6 +133,7 @@ struct ivl_cf
     ivl_cf_planner_t    planner;
     ivl_cf_stock_t      stock;
     ivl_cf_estimate_t   estimate;
+    ivl_cf_frame_t      frame;  ///< of the estimate, if it is not the world's
     ivl_cf_power_t      power;
     ivl_cf_episode_t    episode;
     ivl_in_t            sensed;  ///< of the last tick, in vehicle time
@@ -171,6 +173,9 @@ static inline ivl_sim_world_t *ivl_cf_world(ivl_cf_t *cf)
 }
 
 // ---- cf_senses.c
+
+/// The estimator begins anew: at kalman.initial*, if they are not all 0, else where the vehicle is.
+void ivl_cf_begin_estimate(ivl_cf_t *cf);
 
 /// Sensors and estimator have a tick of the world.
 void ivl_cf_sense(ivl_cf_t *cf, const ivl_in_t *in);

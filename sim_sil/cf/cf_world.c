@@ -77,6 +77,7 @@ void ivl_cf_world_reset(ivl_cf_t *cf)
     (void)ivl_cf_commander_set(&cf->commander, &hover, IVL_CF_PRIORITY_HIGH_LEVEL, now_ms);
     ivl_cf_stock_reset(&cf->stock);
     ivl_cf_estimate_reset(&cf->estimate);
+    cf->frame = (ivl_cf_frame_t){.is_other = false};
     ivl_cf_power_full(&cf->power);
     cf->acc_g[0] = cf->acc_g[1] = 0.0f;
     cf->acc_g[2] = (float)cf->model.raw.world_gravity_mps2 / APP_MPS2_PER_G;

@@ -931,6 +931,30 @@ static void test_velocity_of_tracked_positions_follows_the_motion(void)
     assert_at(1.0, 0.0, 1.25, 0.05);
 }
 
+static void test_an_estimate_that_begins_elsewhere_is_flown_in_its_own_axes(void)
+{
+    run_ms(200);
+    write_f32("kalman", "initialX", 1.0f);
+    write_f32("kalman", "initialY", 2.0f);
+    write_f32("kalman", "initialYaw", 1.5707963f);
+    write_u8("kalman", "resetEstimation", 1);
+    run_ms(20);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, read_log("stateEstimate", "x"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 2.0, read_log("kalman", "stateY"));
+    TEST_ASSERT_DOUBLE_WITHIN(1.0, 90.0, read_log("stateEstimate", "yaw"));
+    for (int i = 0; i < 80; i++)
+    {
+        // half a metre ahead of the nose
+        TEST_ASSERT_TRUE(ivl_cf_set_position(vehicle, (const float[3]){1.0f, 2.5f, 1.0f}, 90.0f));
+        run_ms(100);
+    }
+    assert_at(0.5, 0.0, 1.0, 0.03);
+    write_f32("kalman", "initialX", NAN);
+    write_u8("kalman", "resetEstimation", 1);
+    run_ms(20);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 0.5, read_log("stateEstimate", "x"));
+}
+
 static void test_an_estimator_without_position_refuses_the_core(void)
 {
     take_off();
@@ -1048,6 +1072,7 @@ int main(void)
     RUN_TEST(test_range_upwards_is_the_distance_to_the_ceiling_in_millimetres);
     RUN_TEST(test_poses_of_the_host_are_flown_on_and_their_loss_before_the_trigger_aborts);
     RUN_TEST(test_velocity_of_tracked_positions_follows_the_motion);
+    RUN_TEST(test_an_estimate_that_begins_elsewhere_is_flown_in_its_own_axes);
     RUN_TEST(test_an_estimator_without_position_refuses_the_core);
     RUN_TEST(test_a_reset_from_anywhere_hovers_at_the_start_point_within_a_step);
     RUN_TEST(test_parameters_out_of_range_are_put_back);

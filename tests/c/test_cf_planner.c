@@ -138,6 +138,20 @@ static void test_a_new_way_goes_on_in_the_motion_of_the_last_and_a_landing_stops
     TEST_ASSERT_TRUE(ivl_cf_planner_rests(&planner));
 }
 
+static void test_a_way_that_begins_after_another_has_ended_begins_at_rest_whatever_the_last_set_point_was(void)
+{
+    ivl_cf_planner_go(&planner, ivl_vec3(0.02f, 0.0f, 0.0f), 0.0f, false, 0.04f, 0);
+    // the last set-point was made in full deceleration
+    (void)setpoint_at(30);
+    TEST_ASSERT_TRUE(planner.last.a_W_mps2.x < -5.0f);
+    ivl_cf_planner_catch_up(&planner, 41);
+    ivl_cf_planner_go(&planner, ivl_vec3(-1.0f, 0.0f, 0.0f), 0.0f, false, 2.0f, 41);
+    for (uint32_t ms = 41; ms < 2041; ms += 20)
+    {
+        TEST_ASSERT_TRUE(setpoint_at(ms).p_W_m.x <= 0.0201f);
+    }
+}
+
 static void test_a_spiral_keeps_its_distance_and_turns_with_it(void)
 {
     for (int k = 0; k < 4; k++)
@@ -329,6 +343,7 @@ int main(void)
     RUN_TEST(test_a_linear_way_has_a_steady_speed_and_then_stands);
     RUN_TEST(test_a_heading_turns_the_short_way_round);
     RUN_TEST(test_a_new_way_goes_on_in_the_motion_of_the_last_and_a_landing_stops);
+    RUN_TEST(test_a_way_that_begins_after_another_has_ended_begins_at_rest_whatever_the_last_set_point_was);
     RUN_TEST(test_a_spiral_keeps_its_distance_and_turns_with_it);
     RUN_TEST(test_a_plain_trajectory_is_flown_as_it_is);
     RUN_TEST(test_slower_backwards_moved_and_turned);
