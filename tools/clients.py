@@ -126,14 +126,15 @@ def examples(folder: Path, chosen: list[str], decks: list[str], seconds: float) 
             continue
         text = path.read_text(encoding="utf-8")
         with tempfile.TemporaryDirectory() as copies, Watched(radios(text), decks) as flight:
-            copy = Path(copies) / path.name
-            copy.write_text(addressed(text, flight.sil.uris), encoding="utf-8")
-            command, stored = [sys.executable, str(copy)], Path(copies) / "stored.yaml"
+            here = Path(copies) / "programs"
+            shutil.copytree(path.parent, here)  # with the modules and pictures that lie beside it
+            (here / path.name).write_text(addressed(text, flight.sil.uris), encoding="utf-8")
+            command, stored = [sys.executable, path.name], here / "stored.yaml"
             if "--file" in text:  # it wants a file of stored parameters
                 state = "{default_value: 6, is_stored: true, stored_value: 10}"
                 stored.write_text(f"params:\n  ring.effect: {state}\ntype: persistent_param_state\nversion: '1'\n")
                 command += ["--file", str(stored)]
-            results.append(report(name, run(command, Path(copies), flight, seconds), flight))
+            results.append(report(name, run(command, here, flight, seconds), flight))
     return results
 
 
@@ -142,7 +143,7 @@ def unit_tests(folder: Path, chosen: list[str], decks: list[str], n: int, patter
     results = []
     for path in sorted(folder.glob(pattern)):
         text = path.read_text(encoding="utf-8")
-        for name in re.findall(r"def (test_\w+)", text):
+        for name in re.findall(r"^    def (test_\w+)", text, re.MULTILINE):
             if chosen and not any(word in name for word in chosen):
                 continue
             with tempfile.TemporaryDirectory() as copies, Watched(n, decks) as flight:
