@@ -207,9 +207,12 @@ void ivl_crtp_step(ivl_crtp_t *crtp)
 {
     ivl_cf_step(crtp->cf);
     look_after_zero(crtp);
-    tell_console(crtp);
-    tell_app(crtp);
-    ivl_crtp_params_step(crtp);
+    if (!crtp->is_off)
+    {
+        tell_console(crtp);
+        tell_app(crtp);
+        ivl_crtp_params_step(crtp);
+    }
     ivl_crtp_logs_step(crtp);
     end_run(crtp);
 }

@@ -260,6 +260,10 @@ static void test_power_packets_switch_the_vehicle_and_are_always_acknowledged(vo
     power("f3fe02", "", "ff");
     // nobody is at home
     expect_answer("fc00112233", "");
+    fake.console = "unsaid";
+    ivl_crtp_step(&server);
+    TEST_ASSERT_EQUAL_STRING("", sent);
+    fake.console = NULL;
     expect_said("7c00", "");
     TEST_ASSERT_EQUAL_STRING("", sent);
     power("fffe03", "on", "ff");
