@@ -266,6 +266,7 @@ ivl_ceiling_t ivl_distance_update(const ivl_cfg_t *cfg, ivl_distance_t *distance
     {
         return ivl_ceiling_compute(cfg, sense);
     }
+    distance->measured = false;
     if (!is_approach)
     {
         distance->running = false;
@@ -285,13 +286,11 @@ ivl_ceiling_t ivl_distance_update(const ivl_cfg_t *cfg, ivl_distance_t *distance
         return (ivl_ceiling_t){0};
     }
     measurement_t m;
-    if (read_rrev(cfg, distance, in, &m))
+    const bool    is_rrev = read_rrev(cfg, distance, in, &m);
+    distance->measured = is_rrev || read_range(cfg, distance, in, &m);
+    if (distance->measured)
     {
-        take(cfg, distance, sense, MEASURED_RREV, &m);
-    }
-    else if (read_range(cfg, distance, in, &m))
-    {
-        take(cfg, distance, sense, MEASURED_RANGE, &m);
+        take(cfg, distance, sense, is_rrev ? MEASURED_RREV : MEASURED_RANGE, &m);
     }
     return checked(cfg, show(cfg, distance, sense), distance->since_s);
 }

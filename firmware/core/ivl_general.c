@@ -54,17 +54,15 @@ ivl_action_t ivl_general_action(const float rest[], const ivl_seen_t *seen, ivl_
     };
 }
 
+// the larger product of a factor with the two ends of a coordinate
+static float most_of(float factor, float middle_mps)
+{
+    const float low = factor * ((0.0f - middle_mps) * PER_MPS), high = factor * ((IVL_GENERAL_V_MPS_MAX - middle_mps) * PER_MPS);
+    return (low > high) ? low : high;
+}
+
 float ivl_general_moment_most_Nm(const float rest[])
 {
-    float most = 0.0f;
-    for (int corner = 0; corner < 4; corner++)
-    {
-        const ivl_sensed_t v = {
-            .vx_mps = ((corner & 1) != 0) ? IVL_GENERAL_V_MPS_MAX : 0.0f,
-            .vz_mps = ((corner & 2) != 0) ? IVL_GENERAL_V_MPS_MAX : 0.0f,
-        };
-        const float moment = moment_Nm(rest, ivl_general_point(v));
-        most = (moment > most) ? moment : most;
-    }
-    return most;
+    const float most = rest[0] + most_of(rest[1], MIDDLE_X_MPS) + most_of(rest[2], MIDDLE_Z_MPS);
+    return (most > 0.0f) ? most : 0.0f;
 }

@@ -6,9 +6,6 @@
 // with no thrust left to accelerate with, the aim is still finite: what cannot be reached is left to the rule approach_time
 static const float ACCEL_MPS2_MIN = 0.1f;
 
-// Newton's method from above on a convex function: four steps leave less than 1 mm/s of any speed that is flown
-static const int STEPS = 4;
-
 static float most(float a, float b)
 {
     return (a > b) ? a : b;
@@ -57,49 +54,34 @@ static float accel_mps2(const ivl_cfg_t *cfg, float vbat_V, float dir_z)
     return ivl_clamp(a, ACCEL_MPS2_MIN, most(cfg->approach_accel_mps2, ACCEL_MPS2_MIN));
 }
 
-// Largest v_z that is reached before v_z / d is region_rrev: the vehicle rises (v_0 + v_z) |dv| / 2a meanwhile            [MODEL eq. 15.3]
-static float vz_within(const ivl_cfg_t *cfg, float room_m, float v0x_mps, float v0z_mps, const ivl_aim_t *aim)
+// Largest v with v t + v^2 / 2a within the room: a ramp from rest to v and the way of a time t, or that way and braking  [MODEL eq. 15.3, 15.4]
+static float within(float a_mps2, float t_s, float room_m)
 {
-    const float dx = aim->vx_mps - v0x_mps, per_2a = 0.5f / aim->accel_mps2, delay_s = 1.0f / cfg->region_rrev_per_s;
-    float       vz = aim->vz_mps;
-    for (int i = 0; i < STEPS; i++)
-    {
-        const float dz = vz - v0z_mps, dv = most(sqrtf(dx * dx + dz * dz), 1.0e-6f), sum = v0z_mps + vz;
-        const float over_m = sum * dv * per_2a + vz * delay_s - room_m;
-        const float slope_s = (dv + sum * dz / dv) * per_2a + delay_s;
-        // a room that suffices leaves the aim as it is
-        vz -= most(over_m, 0.0f) / slope_s;
-    }
-    return vz;
-}
-
-// Largest v_x with v_x t + v_x^2 / 2a within the room, t = d / v_z: a straight path from rest to the ceiling, then braking    [MODEL eq. 15.4]
-static float vx_within(const ivl_cfg_t *cfg, float room_m, float t_s)
-{
-    const float a = cfg->approach_accel_mps2;
-    return a * (root(t_s * t_s + 2.0f * most(room_m, 0.0f) / a) - t_s);
+    return a_mps2 * (root(t_s * t_s + 2.0f * most(room_m, 0.0f) / a_mps2) - t_s);
 }
 
 ivl_aim_t ivl_region_aim(const ivl_cfg_t *cfg, const ivl_room_t *room, ivl_vec3_t p_W_m, ivl_vec3_t v_W_mps, ivl_aim_t asked)
 {
     ivl_aim_t   aim = nominal(cfg, asked);
-    const float v0x = ivl_clamp(v_W_mps.x, -cfg->speed_mps_max, cfg->speed_mps_max);
+    const float v0x = ivl_clamp(v_W_mps.x, 0.0f, cfg->speed_mps_max);
     const float v0z = ivl_clamp(v_W_mps.z, 0.0f, cfg->speed_mps_max);
     const float dx = aim.vx_mps - v0x, dz = aim.vz_mps - v0z, dv = sqrtf(dx * dx + dz * dz);
-    aim.accel_mps2 = accel_mps2(cfg, room->vbat_V, (dv > 0.0f) ? dz / dv : 1.0f);
+    const float dir_z = (dv > 0.0f) ? dz / dv : 1.0f;
+    aim.accel_mps2 = accel_mps2(cfg, room->vbat_V, dir_z);
 
     // a vehicle that is faster already is not braked: that would take room, too
     const float up_m = cfg->fence_z_m_max - p_W_m.z;
     const bool  knows = ivl_region_knows(cfg, room);
     const float room_z_m = (knows && !(up_m < room->d_ceil_m)) ? room->d_ceil_m : up_m;
-    const float vz_min = ivl_clamp(v0z, asked.vz_mps, aim.vz_mps);
-    aim.vz_mps = ivl_clamp(vz_within(cfg, room_z_m, v0x, v0z, &aim), vz_min, aim.vz_mps);
+    const float az_mps2 = aim.accel_mps2 * dir_z;
+    const float vz = within(az_mps2, 1.0f / cfg->region_rrev_per_s, room_z_m + 0.5f * v0z * v0z / az_mps2);
+    aim.vz_mps = ivl_clamp(vz, ivl_clamp(v0z, asked.vz_mps, aim.vz_mps), aim.vz_mps);
 
     if (knows && (aim.vz_mps > 0.0f))
     {
         // what the present speed carries the vehicle on while it changes
-        const float on_m = 0.5f * most(v0x, 0.0f) * dv / aim.accel_mps2;
-        const float vx = vx_within(cfg, cfg->fence_x_m_max - p_W_m.x - on_m, room->d_ceil_m / aim.vz_mps);
+        const float on_m = 0.5f * v0x * dv / aim.accel_mps2;
+        const float vx = within(cfg->approach_accel_mps2, room->d_ceil_m / aim.vz_mps, cfg->fence_x_m_max - p_W_m.x - on_m);
         aim.vx_mps = ivl_clamp(vx, asked.vx_mps, aim.vx_mps);
     }
     return aim;

@@ -82,10 +82,23 @@ static void track(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_refe
     ivl_mixer_thrusts(cfg, &wrench, thrust_N);
 }
 
+// the tick in which an approach begins has enough to do
+static void aim(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
+{
+    if ((state->approach.wants != (uint8_t)IVL_APPROACH_NOTHING) && (state->n_phase_tick > 1u))
+    {
+        const ivl_vitals_t *vitals = &state->guard.vitals;
+        const ivl_room_t    room = {
+            .d_ceil_m = seen->ceiling.valid ? seen->ceiling.d_ceil_m : 0.0f,
+            .vbat_V = (vitals->given != 0u) ? vitals->vbat_V : 0.0f,
+        };
+        ivl_approach_aim(cfg, &state->approach, &room, state->distance.measured);
+    }
+}
+
 static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, const ivl_seen_t *seen, float thrust_N[4])
 {
-    const ivl_room_t room = ivl_state_room(state, seen);
-    ivl_reference_t  ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
+    ivl_reference_t ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
     switch (what)
     {
     case IVL_DRIVE_HOVER:
@@ -97,7 +110,7 @@ static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, co
         track(cfg, state, &ref, thrust_N);
         break;
     case IVL_DRIVE_APPROACH:
-        ivl_approach_look(cfg, &state->approach, &room);
+        aim(cfg, state, seen);
         ref = ivl_approach_next(cfg, &state->approach, seen->cues.rrev_per_s, state->derived.dt_s);
         track(cfg, state, &ref, thrust_N);
         break;

@@ -59,7 +59,8 @@ static void test_latch_copies_everything_of_the_tick(void)
 
     // When it is latched
     const ivl_seen_t     seen = {ceiling, cues};
-    const ivl_snapshot_t s = ivl_trigger_snapshot(&sample, &seen, policy, action);
+    ivl_snapshot_t s;
+    ivl_trigger_snapshot(&s, &sample, &seen, &policy, &action);
 
     // Then the snapshot has all of them
     TEST_ASSERT_EQUAL_UINT64(11, s.t_us);

@@ -114,7 +114,7 @@ def _counts(program: Path, recorded: recording.Recording) -> dict[str, list[int]
     if run.returncode != 0:
         raise RuntimeError(f"{program}: exit code {run.returncode}: {run.stderr.strip()}")
     rows = (line.split(",") for line in run.stderr.splitlines() if line.count(",") == 4)
-    return {name: [int(number) for number in numbers] for name, *numbers in rows}
+    return {PHASES[int(number)]: [int(count) for count in counts] for number, *counts in rows}
 
 
 def worst(figures: dict[str, Any], name: str) -> float:
