@@ -6,10 +6,10 @@
 #include "ivl_pwm.h"
 #include "ivl_wire.h"
 
-#define ROW(ctype, group, name, field, unit, min, max, dflt, doc) ROW_##field,
-#define ENTRY(ctype, group, name, field, unit, min, max, dflt, doc)                                                                        \
-    {(float)(min), (float)(max), (float)(dflt)},
-#define PLACE(ctype, group, name, field, unit, min, max, dflt, doc) {offsetof(ivl_cfg_t, field), sizeof(ctype)},
+#define ROW(ctype, group, name, field, unit, min, max, dflt, doc)     ROW_##field,
+#define RANGE(ctype, group, name, field, unit, min, max, dflt, doc)   {(float)(min), (float)(max)},
+#define DEFAULT(ctype, group, name, field, unit, min, max, dflt, doc) .field = (ctype)(dflt),
+#define PLACE(ctype, group, name, field, unit, min, max, dflt, doc)   {offsetof(ivl_cfg_t, field), sizeof(ctype)},
 
 enum
 {
@@ -25,11 +25,13 @@ typedef struct
 
 typedef struct
 {
-    float min, max, dflt;
-} entry_t;
+    float min, max;
+} range_t;
 
 static const place_t PLACES[] = {IVL_PARAMS(PLACE)};
-static const entry_t ENTRIES[] = {IVL_PARAMS(ENTRY)};
+static const range_t RANGES[] = {IVL_PARAMS(RANGE)};
+
+static const ivl_cfg_t DEFAULTS = {IVL_PARAMS(DEFAULT)};
 
 static float get(const ivl_cfg_t *cfg, int row)
 {
@@ -42,25 +44,9 @@ static float get(const ivl_cfg_t *cfg, int row)
     return value;
 }
 
-static void set(ivl_cfg_t *cfg, int row, float value)
-{
-    uint8_t *at = (uint8_t *)cfg + PLACES[row].offset;
-    if (PLACES[row].size == sizeof value)
-    {
-        memcpy(at, &value, sizeof value);
-    }
-    else
-    {
-        *at = (uint8_t)value;
-    }
-}
-
 void ivl_cfg_defaults(ivl_cfg_t *cfg)
 {
-    for (int row = 0; row < (int)ROW_COUNT; row++)
-    {
-        set(cfg, row, ENTRIES[row].dflt);
-    }
+    *cfg = DEFAULTS;
 }
 
 static int bad_range(const ivl_cfg_t *cfg)
@@ -69,7 +55,7 @@ static int bad_range(const ivl_cfg_t *cfg)
     {
         // in positive form, so that NaN is refused
         const float value = get(cfg, row);
-        if (!((value >= ENTRIES[row].min) && (value <= ENTRIES[row].max)))
+        if (!((value >= RANGES[row].min) && (value <= RANGES[row].max)))
         {
             return row;
         }

@@ -25,6 +25,11 @@ static float cos_poly(float z)
     return 1.0f - 0.5f * z + z * z * (4.166664687e-2f + z * (-1.388736752e-3f + z * 2.443845160e-5f));
 }
 
+bool ivl_vec3_within(ivl_vec3_t a, float limit)
+{
+    return ivl_within(a.x, limit) && ivl_within(a.y, limit) && ivl_within(a.z, limit);
+}
+
 ivl_sincos_t ivl_sincos(float x_rad)
 {
     if (!ivl_within(x_rad, SINCOS_RAD_MAX))

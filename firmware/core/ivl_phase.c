@@ -109,12 +109,12 @@ typedef struct
     uint8_t       drive;  // ivl_drive_t
 } row_t;
 
+// clang-format off
 #define ON(condition, phase) {.when = (condition), .next = IVL_PHASE_##phase}
 #define RULE(says, phase)    {.act = IVL_ACT_##says, .next = IVL_PHASE_##phase}
 #define EXITS(...)           (const exit_t[]) {__VA_ARGS__, {.when = NULL}}
 
 // A request to abort does nothing once the trigger has fired: half a flip is worse than a whole one.  IDLE is the kill switch of every phase.
-// clang-format off
 static const row_t ROWS[] = {
     [IVL_PHASE_IDLE] = {EXITS(
         ON(may_arm,          READY)), IVL_DRIVE_OFF},
@@ -299,9 +299,9 @@ ivl_drive_t ivl_phase_drive(const ivl_state_t *state)
 
 #ifndef IVL_NO_TEXT
 static const char *const NAMES[] = {
-    [IVL_PHASE_IDLE] = "idle",         [IVL_PHASE_READY] = "ready", [IVL_PHASE_APPROACH] = "approach",
-    [IVL_PHASE_FLIP] = "flip",         [IVL_PHASE_COAST] = "coast", [IVL_PHASE_ATTACHED] = "attached",
-    [IVL_PHASE_DONE] = "done",         [IVL_PHASE_ABORTED] = "aborted", [IVL_PHASE_LEVEL_OUT] = "level_out",
+    [IVL_PHASE_IDLE] = "idle", [IVL_PHASE_READY] = "ready",     [IVL_PHASE_APPROACH] = "approach",
+    [IVL_PHASE_FLIP] = "flip", [IVL_PHASE_COAST] = "coast",     [IVL_PHASE_ATTACHED] = "attached",
+    [IVL_PHASE_DONE] = "done", [IVL_PHASE_ABORTED] = "aborted", [IVL_PHASE_LEVEL_OUT] = "level_out",
 };
 _Static_assert(sizeof NAMES / sizeof NAMES[0] == (size_t)IVL_PHASE_COUNT, "one name a phase");
 

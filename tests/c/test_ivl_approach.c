@@ -3,7 +3,6 @@
 
 static const float DT_S = 0.002f;
 
-
 static ivl_cfg_t defaults(void)
 {
     ivl_cfg_t cfg;
@@ -125,8 +124,7 @@ static void test_holding_rrev_lets_the_speed_fall_with_the_distance_and_ends_at_
     cfg.shape = (uint8_t)IVL_SHAPE_RREV;
     const float    angle = 1.2f, d0_m = 2.0f;
     ivl_approach_t approach;
-    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, -d0_m), ivl_vec3(2.5f * cosf(angle), 0.0f, 2.5f * sinf(angle)), 2.5f,
-                       angle);
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, -d0_m), ivl_vec3(2.5f * cosf(angle), 0.0f, 2.5f * sinf(angle)), 2.5f, angle);
     float rrev = 0.0f;
     bool  was_held = false;
     while (approach.p_W_m.z < -0.2f)

@@ -106,7 +106,8 @@ static void test_the_search_finds_what_a_scan_of_all_rows_finds_in_every_phase(v
     {
         for (int rule = 1; rule < (int)IVL_RULE_COUNT; rule++)
         {
-            TEST_ASSERT_EQUAL_INT_MESSAGE(table_applies((ivl_rule_t)rule, (ivl_phase_t)phase), n_found[phase][rule] > 0, rule_text((ivl_rule_t)rule));
+            TEST_ASSERT_EQUAL_INT_MESSAGE(table_applies((ivl_rule_t)rule, (ivl_phase_t)phase), n_found[phase][rule] > 0,
+                                          rule_text((ivl_rule_t)rule));
         }
     }
 }
