@@ -2,7 +2,6 @@
 /// The rules.  Read the table first; docs/SAFETY.md says on which property of the vehicle each row rests.
 #include "ivl_guard.h"
 
-#include "ivl_level_out.h"
 #include "ivl_math.h"
 
 // ---- conditions: pure questions about this tick.  Written in positive form and negated, so that a NaN counts as the bad case.
@@ -204,7 +203,8 @@ CONDITION(cue_invalid)
 
 CONDITION(would_not_land)
 {
-    return !state->action.go && ivl_level_out_asked(cfg, state, seen);
+    UNUSED(cfg), UNUSED(seen);
+    return !state->action.go && state->decision.asked;
 }
 
 // ---- the table: the first row that holds counts
@@ -264,16 +264,16 @@ CONDITION(would_not_land)
     X(with, NO_GO,         "no_go",         APPROACH,      would_not_land,     LEVEL,  SCORED)
 // clang-format on
 
+// packed into two words
 typedef struct
 {
-    const char *name;
-    uint32_t    phases;
     condition_t when;
-    uint8_t     act;  // ivl_act_t; a byte, so that a row stays one of four words
+    uint16_t    phases;  // bits
+    uint8_t     act;     // ivl_act_t
     bool        discards;
 } row_t;
 
-#define ROW(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = {name, phases, when, IVL_ACT_##act, discards},
+#define ROW(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = {when, phases, IVL_ACT_##act, discards},
 static const row_t ROWS[] = {RULES(ROW, )};
 
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_RULE_COUNT, "one row a rule");
@@ -324,10 +324,15 @@ bool ivl_guard_applies(ivl_rule_t rule, ivl_phase_t phase)
     return is_rule(rule) && ((unsigned)phase < (unsigned)IVL_PHASE_COUNT) && ((ROWS[rule].phases & (1u << phase)) != 0u);
 }
 
+#ifndef IVL_NO_TEXT
+#define NAME(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = (name),
+static const char *const NAMES[] = {RULES(NAME, )};
+
 const char *ivl_guard_name(ivl_rule_t rule)
 {
-    return is_rule(rule) ? ROWS[rule].name : "?";
+    return is_rule(rule) ? NAMES[rule] : "?";
 }
+#endif
 
 // ---- lock-out
 

@@ -16,7 +16,7 @@ float ivl_level_out_rise_m(const ivl_cfg_t *cfg, float v_close_mps, float thrust
 bool ivl_level_out_is_last(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen);
 
 /// True if go or no-go is to be decided in this tick: it has not been decided in this approach, and the policy would flip now, or it is the
-/// last moment.  Asked with a valid cue.
+/// last moment, while the ceiling comes closer.  Asked with a valid cue.
 bool ivl_level_out_asked(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen);
 
 /// Begin: cut the thrust and rise.

@@ -89,7 +89,7 @@ static void test_no_go_is_decided_at_the_last_moment(void)
         approach(0.5f, -3.0f, 20.0f);
         climb(v);
         assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
-        TEST_ASSERT_EQUAL_STRING("no_go", ivl_guard_name((ivl_rule_t)fix.state.guard.cause));
+        TEST_ASSERT_EQUAL_INT(IVL_RULE_NO_GO, fix.state.guard.cause);
         TEST_ASSERT_TRUE(fix.state.decision.made && !fix.state.decision.go);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 1.0f / (1.0f + 20.0855369f), fix.state.decision.p_land);
         const float d_m = fix.state.decision.d_ceil_m;
@@ -142,6 +142,25 @@ static void test_a_policy_that_always_goes_never_levels_out(void)
         climb(v);
         assert_phase(IVL_PHASE_FLIP, &fix);
         TEST_ASSERT_TRUE(fix.state.decision.made && fix.state.decision.go);
+    }
+}
+
+static void test_nothing_is_decided_before_the_ceiling_comes_closer(void)
+{
+    // an approach that begins past the last moment, at rest
+    const float p_min[] = {0.0f, 0.5f};
+    for (int i = 0; i < 2; i++)
+    {
+        approach(p_min[i], -3.0f, 20.0f);
+        fix.in.v_WB_mps = ivl_vec3(0.0f, 0.0f, 0.0f);
+        fix.in.p_WB_m.z = fix.cfg.h_ceil_m - 0.05f;
+        fix_ticks(&fix, 0.05f);
+        assert_phase(IVL_PHASE_APPROACH, &fix);
+        TEST_ASSERT_FALSE(fix.state.decision.made);
+        fix.in.v_WB_mps.z = 0.01f;
+        fix_tick(&fix);
+        assert_phase((i == 0) ? IVL_PHASE_APPROACH : IVL_PHASE_LEVEL_OUT, &fix);
+        TEST_ASSERT_TRUE(fix.state.decision.made);
     }
 }
 
@@ -215,7 +234,7 @@ static void test_a_forgotten_level_out_lands(void)
     fix.in.v_WB_mps.z = 0.0f;
     fix_ticks(&fix, fix.cfg.level_out_s_max + 0.01f);
     assert_phase(IVL_PHASE_ABORTED, &fix);
-    TEST_ASSERT_EQUAL_STRING("level_out_time", ivl_guard_name((ivl_rule_t)fix.state.guard.cause));
+    TEST_ASSERT_EQUAL_INT(IVL_RULE_LEVEL_OUT_TIME, fix.state.guard.cause);
 }
 
 static void test_brakes_along_the_ceiling_without_a_jump(void)
@@ -249,6 +268,7 @@ int main(void)
     RUN_TEST(test_a_go_at_the_last_moment_is_not_taken_back);
     RUN_TEST(test_no_go_without_a_valid_cue_is_not_decided);
     RUN_TEST(test_a_policy_that_always_goes_never_levels_out);
+    RUN_TEST(test_nothing_is_decided_before_the_ceiling_comes_closer);
     RUN_TEST(test_the_next_approach_decides_anew);
     RUN_TEST(test_level_out_keeps_the_margin_and_hovers_where_the_approach_began);
     RUN_TEST(test_hover_is_obeyed_only_when_it_no_longer_rises);
