@@ -279,24 +279,24 @@ static const row_t ROWS[] = {RULES(ROW, )};
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_RULE_COUNT, "one row a rule");
 _Static_assert(IVL_RULE_COUNT <= 255, "a rule is logged in one byte");
 
-// first row of the table that names a phase: those before it need no look
-#define OR_FIRST(with, id, name, phases, when, act, discards) (((phases) & (with)) != 0u) ? (uint8_t)IVL_RULE_##id:
-#define FIRST_OF(phase)                                       (RULES(OR_FIRST, 1u << (phase))(uint8_t) IVL_RULE_COUNT)
-static const uint8_t FIRST[] = {
-    [IVL_PHASE_IDLE] = FIRST_OF(IVL_PHASE_IDLE),           [IVL_PHASE_READY] = FIRST_OF(IVL_PHASE_READY),
-    [IVL_PHASE_APPROACH] = FIRST_OF(IVL_PHASE_APPROACH),   [IVL_PHASE_FLIP] = FIRST_OF(IVL_PHASE_FLIP),
-    [IVL_PHASE_COAST] = FIRST_OF(IVL_PHASE_COAST),         [IVL_PHASE_ATTACHED] = FIRST_OF(IVL_PHASE_ATTACHED),
-    [IVL_PHASE_DONE] = FIRST_OF(IVL_PHASE_DONE),           [IVL_PHASE_ABORTED] = FIRST_OF(IVL_PHASE_ABORTED),
-    [IVL_PHASE_LEVEL_OUT] = FIRST_OF(IVL_PHASE_LEVEL_OUT),
+// bits of the rows that name a phase: the others need no look
+#define BIT_IF(with, id, name, phases, when, act, discards) | ((((phases) & (with)) != 0u) ? 1u << IVL_RULE_##id : 0u)
+#define ROWS_OF(phase)                                      [phase] = 0u RULES(BIT_IF, 1u << (phase))
+static const uint32_t OF_PHASE[] = {
+    ROWS_OF(IVL_PHASE_IDLE), ROWS_OF(IVL_PHASE_READY),   ROWS_OF(IVL_PHASE_APPROACH),
+    ROWS_OF(IVL_PHASE_FLIP), ROWS_OF(IVL_PHASE_COAST),   ROWS_OF(IVL_PHASE_ATTACHED),
+    ROWS_OF(IVL_PHASE_DONE), ROWS_OF(IVL_PHASE_ABORTED), ROWS_OF(IVL_PHASE_LEVEL_OUT),
 };
-_Static_assert(sizeof FIRST / sizeof FIRST[0] == (size_t)IVL_PHASE_COUNT, "one entry a phase");
+_Static_assert(sizeof OF_PHASE / sizeof OF_PHASE[0] == (size_t)IVL_PHASE_COUNT, "one entry a phase");
+_Static_assert(IVL_RULE_COUNT <= 32, "one bit a rule");
 
 ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 {
-    const uint32_t phase = 1u << state->phase;
-    for (int i = (int)FIRST[state->phase]; i < (int)IVL_RULE_COUNT; i++)
+    for (uint32_t left = OF_PHASE[state->phase]; left != 0u; left &= left - 1u)
     {
-        if (((ROWS[i].phases & phase) != 0u) && ROWS[i].when(cfg, state, seen))
+        // the lowest bit that is left
+        const int i = __builtin_ctz(left);
+        if (ROWS[i].when(cfg, state, seen))
         {
             return (ivl_rule_t)i;
         }
