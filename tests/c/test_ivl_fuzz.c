@@ -2,6 +2,7 @@
 /// Seeded random flights: valid and garbage inputs mixed, requests and policies at random, over all phases.
 /// After every tick: outputs finite and in range, motors off where they must be, at most one trigger per arm cycle and only on an input
 /// that is good by this file's own judgement, the snapshot unchanged until the next cycle, and no motor on inputs that have been bad for long.
+#include "ivl_general.h"
 #include "test_ivl_support.h"
 
 // fewer on a slow machine, more for a long search
@@ -205,6 +206,11 @@ static void random_policy(flight_t *f)
         policy.theta[i] = middle + rng_float(&f->rng, -1.05f, 1.05f) * span;
     }
     policy.theta[0] = rng_float(&f->rng, -0.1f, 8.0f);
+    // a form with go / no-go: one half of the landings is thought improbable
+    if (form->groups[form->n_groups - 1u].n == IVL_GENERAL_N_GO - 1)
+    {
+        policy.theta[policy.n - (uint32_t)IVL_GENERAL_N_GO] = rng_float(&f->rng, 0.0f, 1.0f);
+    }
     policy.id.crc = ivl_policy_crc(&policy);
     (void)ivl_policy_commit(&f->fix.cfg, &f->fix.state, &policy);
 }
