@@ -22,7 +22,7 @@ from ivl.policy.assess import Assessment
 from ivl.policy.file import PolicyFile
 from ivl.policy.flying import Family, Place, PolicyTask, fly
 from ivl.policy.flying import score as score_of
-from ivl.policy.region import BOX, NAMED, Approaches, Region, Series
+from ivl.policy.region import BOX, PLANE, Approaches, Series
 from ivl.policy.shape import General, is_general
 from ivl.policy.start import moment_most_Nmm, smooth
 from ivl.seeds import Purpose, derive
@@ -32,19 +32,20 @@ SEED = 7
 """Of all judgements; learning has the seed of the experiment, and no series of a purpose meets one of another."""
 N_APPROACHES = 2000
 QUICK = (
-    "map.n_speeds=6", "map.n_angles=6", "map.n_thresholds=40", "map.moments_norm=[0.8, 1.0]", "search.n_iterations=15",
-    "search.n_approaches=50", "search.n_select=300", "go.n_approaches=200", "go.n_held_out=100",
+    "map.n_speeds=6", "map.n_angles=6", "map.n_thresholds=40", "map.moments_norm=[0.9]", "search.n_iterations=10",
+    "search.n_approaches=30", "search.n_select=100", "go.n_approaches=100", "go.n_held_out=100",
 )  # fmt: skip
-"""A smaller budget, for gears, forms and families."""
-OVER_BOX = ("regions=[box]", "search.n_approaches=100")
+"""A small budget, for gears, forms and families."""
+OVER_BOX = ("regions=[box]", "search.n_approaches=60", "search.n_select=200")
 ON = (
-    "map.n_speeds=4", "map.n_angles=4", "map.n_thresholds=20", "map.moments_norm=[0.9]", "search.n_iterations=10",
-    "search.n_approaches=60", "search.spread_per_s=0.15", "search.n_select=500", "go.n_approaches=4000",
-    "go.n_held_out=2000",
+    "map.n_speeds=4", "map.n_angles=4", "map.n_thresholds=20", "map.moments_norm=[0.9]", "search.n_iterations=8",
+    "search.n_approaches=50", "search.spread_per_s=0.15", "search.n_select=300", "go.n_approaches=100",
+    "go.n_held_out=100",
 )  # fmt: skip
 """The search on from the policy of ideal sensing, with other sensors."""
+GO_ALONE = (*ON[:4], "search.n_iterations=0", "search.n_select=100", "go.n_approaches=4000", "go.n_held_out=2000")
+"""The same thresholds, and go / no-go learned with other sensors."""
 SENSORS = {
-    "ideal": (),
     "mocap": ("sensing=mocap",),
     "camera50": ("sensing=camera50", "estimator=kalman"),
     "camera50_delay20": ("sensing=camera50_delay20", "estimator=kalman"),
@@ -78,11 +79,6 @@ class Bench:
             file.save(found, path)
         return file.load(path)
 
-    def for_sensors(self, name: str) -> PolicyFile:
-        """The policy of ideal sensing, or one that was searched on from it with other sensors."""
-        ideal = self.learned()
-        return ideal if name == "ideal" else self.learned(*ON, *SENSORS[name], start=ideal)
-
     def judged(self, policy: PolicyFile) -> Assessment:
         """On what it was learned on."""
         self.say(f"judging: {policy.form}, {policy.tasks[0].gear}, {policy.tasks[0].sensing or 'own sensors'}")
@@ -101,13 +97,15 @@ def about(policy: PolicyFile) -> Data:
 
 
 def sensors(bench: Bench) -> Data:
-    """Each sensor set with the policy that was learned with it, and with that of ideal sensing."""
-    ideal = bench.for_sensors("ideal")
-    found: Data = {"ideal": {**about(ideal), **bench.judged(ideal).as_dict()}}
-    for name in list(SENSORS)[1:]:
-        own = bench.for_sensors(name)
-        unchanged = rates(bench, ideal.model_copy(update={"tasks": own.tasks}))
-        found[name] = {**about(own), **bench.judged(own).as_dict(), "of_ideal": unchanged}
+    """The default policy; those that were searched on from it with other sensors; and its go / no-go with a camera."""
+    ideal = bench.learned()
+    found: Data = {"ideal": {**about(ideal), **over(bench, ideal, "box", "plane", "shaped")}}
+    for name, regions in (("mocap", ("box",)), ("camera50_delay20", ("box", "plane", "shaped"))):
+        own = bench.learned(*ON, *SENSORS[name], start=ideal)
+        unchanged = over(bench, ideal.model_copy(update={"tasks": own.tasks}), "box")
+        found[name] = {**about(own), **over(bench, own, *regions), "of_ideal": unchanged["box"]}
+    camera = bench.learned(*GO_ALONE, *SENSORS["camera50"], start=ideal)
+    found["camera50"] = {**about(camera), **bench.judged(camera).as_dict()}
     return found
 
 
@@ -116,10 +114,10 @@ class Cells:
     """Middles of equal cells of the box, n approaches in each, with random numbers of their own."""
 
     n_axis: int = 6
-    n_coarse: int = 3
-    n_choose: int = 24
-    n_judge: int = 60
-    n_finalists: int = 6
+    n_coarse: int = 2
+    n_choose: int = 16
+    n_judge: int = 50
+    n_finalists: int = 5
 
     def approaches(self, n: int, first: int, purpose: Purpose) -> Approaches:
         """Shape (cells * n,), the n of a cell side by side."""
@@ -142,7 +140,7 @@ def ceiling(bench: Bench, task: PolicyTask, cells: Cells) -> tuple[FloatArray, A
     """
     bench.say(f"the best of each cell: {task.vehicle}, {task.gear}, {task.sensing or 'own sensors'}")
     place, n_cells = Place.of(task), cells.n_axis**2
-    tau_s = np.linspace(0.1, 0.42, 45)
+    tau_s = np.linspace(0.12, 0.4, 36)
     moments = moment_most_Nmm([place]) * np.array([0.75, 0.9, 1.0])
     grid = np.stack(np.broadcast_arrays(1.0 / tau_s, moments[:, None]), axis=-1)  # (moments, thresholds, 2)
     coarse = cells.approaches(cells.n_coarse, 0, Purpose.GRID)
@@ -178,23 +176,29 @@ def beside_ceiling(bench: Bench, policy: PolicyFile, cells: Cells | None = None)
     (flown,) = fly([place], policy.form, theta, approaches, bench.threads)
     own = np.array([four_leg(flown).mean(), clean(flown).mean()])
     return {
-        "box": rates(bench, policy),
+        **over(bench, policy, "box"),
         "cells": {"landed": own[0], "clean": own[1], "flights": len(approaches)},
         "best": {"landed": best[0], "clean": best[1]},
         "ratio": {"landed": own[0] / best[0], "clean": own[1] / best[1]},
     }
 
 
-def rates(bench: Bench, policy: PolicyFile, region: Region = BOX) -> Data:
-    """Landed and clean over fresh approaches of a region, every approach flown."""
+def over(bench: Bench, policy: PolicyFile, *names: str) -> Data:
+    """Landed and clean over fresh approaches of box, plane, or the plane with a shaped approach, every one flown."""
     theta = General(policy.form).always_go(policy.values) if is_general(policy.form) else np.array(policy.values)
-    approaches = Series([region], SEED, Purpose.ASSESS).next(N_APPROACHES)
-    (flown,) = fly([Place.of(policy.tasks[0])], policy.form, theta, approaches, bench.threads)
-    landed, spotless = share_of(four_leg(flown)), share_of(clean(flown))
-    return {
-        "landed": landed.value, "landed_interval": [landed.low, landed.high],
-        "clean": spotless.value, "clean_interval": [spotless.low, spotless.high], "flights": landed.n,
-    }  # fmt: skip
+    found: Data = {}
+    for name in names:
+        task = policy.tasks[0]
+        bench.say(f"{N_APPROACHES} approaches, {name}: {task.vehicle}, {task.gear}, {task.sensing or 'own sensors'}")
+        place = Place.of(assess.shaped(task) if name == "shaped" else task)
+        approaches = Series([BOX if name == "box" else PLANE], SEED, Purpose.ASSESS).next(N_APPROACHES)
+        (flown,) = fly([place], policy.form, theta, approaches, bench.threads)
+        landed, spotless = share_of(four_leg(flown)), share_of(clean(flown))
+        found[name] = {
+            "landed": landed.value, "landed_interval": [landed.low, landed.high],
+            "clean": spotless.value, "clean_interval": [spotless.low, spotless.high], "flights": landed.n,
+        }  # fmt: skip
+    return found
 
 
 def gears(bench: Bench) -> Data:
@@ -216,16 +220,16 @@ def forms(bench: Bench) -> Data:
     found: Data = {}
     for name, data in policies.items():
         policy = file.make(policy_forms.by_name(name), data["theta"], general.load([EXPERIMENT]).tasks, None, None)
-        found[name] = {**data, **{region: rates(bench, policy, series) for region, series in NAMED.items()}}
+        found[name] = {**data, **over(bench, policy, "box", "plane")}
     return found
 
 
 def _constant(bench: Bench, chosen: general.GeneralExperiment) -> Data:
     """The best threshold and moment of a grid, over approaches of the search; about as many flights as the others."""
     place = Place.of(chosen.tasks[0])
-    moments = moment_most_Nmm([place]) * np.array([0.7, 0.8, 0.9, 1.0])
-    grid = np.stack(np.broadcast_arrays(np.linspace(3.0, 6.5, 71), moments[:, None]), axis=-1).reshape(-1, 2)
-    approaches = Series(list(chosen.regions), chosen.seed, Purpose.SEARCH).next(80)
+    moments = moment_most_Nmm([place]) * np.array([0.75, 0.9, 1.0])
+    grid = np.stack(np.broadcast_arrays(np.linspace(3.5, 6.0, 51), moments[:, None]), axis=-1).reshape(-1, 2)
+    approaches = Series(list(chosen.regions), chosen.seed, Purpose.SEARCH).next(30)
     bench.say("grid of constant policies")
     (flown,) = fly([place], "constant", grid, approaches, bench.threads)
     best = grid[score_of(flown).mean(axis=-1).argmax()]
@@ -242,12 +246,12 @@ def family(bench: Bench) -> Data:
             "nominal": bench.learned(*QUICK, *OVER_BOX, *FLOWN, f"gear={gear}"),
             "family": bench.learned(
                 *QUICK, *OVER_BOX, *FLOWN, f"gear={gear}", f"family.n_vehicles={N_FAMILY}", "family.seed=1",
-                "search.n_approaches=17", "search.n_select=50",
+                "search.n_approaches=10", "search.n_select=33",
             ),
         }  # fmt: skip
         drawn = Family(n_vehicles=N_DRAWN, seed=SEED)
         places = Place.of(policies["nominal"].tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
-        approaches = Series([BOX], SEED, Purpose.ASSESS).next(200)
+        approaches = Series([BOX], SEED, Purpose.ASSESS).next(100)
         row: Data = {}
         for name, policy in policies.items():
             bench.say(f"{N_DRAWN} vehicles, {gear}: {name}")
@@ -259,7 +263,7 @@ def family(bench: Bench) -> Data:
                 "landed": float(landed.mean()),
                 "clean": float(shares[name][:, 1].mean()),
                 "worst_tenth": float(landed[: -(-N_DRAWN // 10)].mean()),
-                "nominal_box": rates(bench, policy.model_copy(update={"tasks": policies["nominal"].tasks})),
+                "nominal_box": over(bench, policy, "box")["box"],
             }
         gain = shares["family"][:, 0] - shares["nominal"][:, 0]
         half = float(Z95 * gain.std(ddof=1) / np.sqrt(gain.size))

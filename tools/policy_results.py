@@ -11,12 +11,12 @@ program; everything else in the file is written by hand.
 """
 
 import argparse
-import difflib
 import json
 import sys
 from pathlib import Path
 from typing import Any
 
+import marked
 import policy_text
 from policy_measure import PARTS, Bench
 
@@ -50,15 +50,10 @@ def main(arguments: list[str] | None = None) -> int:
             parser.error(f"no part {unknown[0]!r} (allowed {', '.join(PARTS)})")
         measure(args.parts or list(PARTS), args.data, args.kept, args.threads)
         return 0
-    old = args.results.read_text(encoding="utf-8")
-    new = replace_section(old, policy_text.section(read(args.data)))
+    new = policy_text.section(read(args.data))
     if args.command == "write":
-        args.results.write_text(new, encoding="utf-8")
-        return 0
-    changes = difflib.unified_diff(old.splitlines(), new.splitlines(), str(args.results), "from the data", lineterm="")
-    different = list(changes)
-    print("\n".join(different[:60]) if different else f"{args.results.name}: equal to what {args.data} gives")
-    return 1 if different else 0
+        return marked.write(args.results, new, BEGIN, END)
+    return marked.check(args.results, new, BEGIN, END, args.data)
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -86,18 +81,6 @@ def _short(data: Any, name: str = "") -> Any:
     if isinstance(data, list) and name != "theta":
         return [_short(value) for value in data]
     return round(data, _DIGITS) if isinstance(data, float) else data
-
-
-def replace_section(text: str, new: str) -> str:
-    """The file's text with a new part between the marks.
-
-    Raises:
-        ValueError: The marks are not there, once each and in order.
-    """
-    if text.count(BEGIN) != 1 or text.count(END) != 1 or text.index(BEGIN) > text.index(END):
-        raise ValueError(f"expected {BEGIN} and, after it, {END}, once each")
-    head, tail = text[: text.index(BEGIN) + len(BEGIN)], text[text.index(END) :]
-    return f"{head}\n\n{new.strip()}\n\n{tail}"
 
 
 if __name__ == "__main__":

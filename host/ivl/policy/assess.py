@@ -146,11 +146,11 @@ def assess(
         flown = fly(flown_by, policy.form, free, approaches, threads)
         return _rates(flown) if family is None else _rates_of_vehicles(flown)
 
-    shaped = None
+    led = None
     if SHAPED in APPROACHES:
-        shaped = rates("shaped", _places([_shaped(task) for task in tasks or policy.tasks], family))
+        led = rates("shaped", _places([shaped(task) for task in tasks or policy.tasks], family))
     judged = _go(General(policy.form), places, theta, n_approaches, seed, threads) if is_general(policy.form) else None
-    return Assessment(rates("box", places), rates("plane", places), shaped, judged)
+    return Assessment(rates("box", places), rates("plane", places), led, judged)
 
 
 def _series(region: Region, seed: int) -> Series:
@@ -164,7 +164,8 @@ def _places(tasks: Sequence[PolicyTask], family: Family | None) -> list[Place]:
     return [member for place in places for member in place.members(family, Purpose.FAMILY_ASSESS)]
 
 
-def _shaped(task: PolicyTask) -> PolicyTask:
+def shaped(task: PolicyTask) -> PolicyTask:
+    """The same task with the approach that leads into the region, and room for it."""
     own = task.overrides.get("start.room")
     if own is not None and own.value >= SHAPED_ROOM_M:
         return task.model_copy(update={"approach": SHAPED})
