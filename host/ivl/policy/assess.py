@@ -181,9 +181,15 @@ def _rates(flown: Sequence[Outcomes]) -> Rates:
 def _rates_of_vehicles(flown: Sequence[Outcomes]) -> Rates:
     """Flights of one vehicle are alike, so the vehicles count for the intervals, not the flights."""
     shares = np.array([[rate(outcomes).mean() for outcomes in flown] for rate in (four_leg, clean)])
-    landed, spotless = (Estimate(float(s.mean()), *map(float, wilson(s.mean(), s.size)), s.size) for s in shares)
+    landed, spotless = (_mean_over_vehicles(of) for of in shares)
     worst = np.sort(shares[0])[: -(-shares.shape[1] // 10)]
     return Rates(landed, spotless, float(worst.mean()), sum(outcomes.size for outcomes in flown))
+
+
+def _mean_over_vehicles(shares: FloatArray) -> Estimate:
+    mean = float(shares.mean())
+    low, high = wilson(mean, shares.size)
+    return Estimate(mean, float(low), float(high), shares.size)
 
 
 def _go(general: General, places: Sequence[Place], theta: FloatArray, n: int, seed: int, threads: int | None) -> Go:
