@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import policy_oneclass
 
 from ivl import forms as policy_forms
 from ivl.analysis.intervals import Z95, share_of
@@ -54,6 +55,7 @@ GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long"
 FLOWN = ("vehicle=crazyflie21", "gear_set=table1")
 FORMS = ("polynomial2", "polynomial3", "bilinear")
 N_FAMILY, N_DRAWN = 6, 20
+N_ONE_CLASS = 1000
 Data = dict[str, Any]
 FloatArray = npt.NDArray[np.float64]
 
@@ -97,16 +99,43 @@ def about(policy: PolicyFile) -> Data:
 
 
 def sensors(bench: Bench) -> Data:
-    """The default policy; those that were searched on from it with other sensors; and its go / no-go with a camera."""
+    """The default policy, and those that were searched on from it with other sensors."""
     ideal = bench.learned()
     found: Data = {"ideal": {**about(ideal), **over(bench, ideal, "box", "plane", "shaped")}}
     for name, regions in (("mocap", ("box",)), ("camera50_delay20", ("box", "plane", "shaped"))):
         own = bench.learned(*ON, *SENSORS[name], start=ideal)
         unchanged = over(bench, ideal.model_copy(update={"tasks": own.tasks}), "box")
         found[name] = {**about(own), **over(bench, own, *regions), "of_ideal": unchanged["box"]}
-    camera = bench.learned(*GO_ALONE, *SENSORS["camera50"], start=ideal)
-    found["camera50"] = {**about(camera), **bench.judged(camera).as_dict()}
     return found
+
+
+def go_no_go(bench: Bench) -> Data:
+    """The default policy with a go / no-go that was learned with a camera, over the plane."""
+    policy = bench.learned(*GO_ALONE, *SENSORS["camera50"], start=bench.learned())
+    return {"camera50": {**about(policy), **bench.judged(policy).as_dict(), "contacts": contacts(bench, policy)}}
+
+
+def contacts(bench: Bench, policy: PolicyFile) -> Data:
+    """When the refused approaches of `assess` touched the ceiling: before they were called off, or in the level-out."""
+    place = Place.of(policy.tasks[0])
+    approaches = Series([PLANE], SEED, Purpose.ASSESS).next(N_APPROACHES)
+    (flown,) = fly([place], policy.form, np.array(policy.values), approaches, bench.threads)
+    touched = np.flatnonzero((flown["no_go"] == 1) & np.isfinite(flown["t_impact_s"]))
+    phases = []
+    for i in touched:
+        rows = place.world.trace(
+            float(approaches.speed_mps[i]), float(approaches.angle_deg[i]), *policy.values, form=policy.form,
+            seed=approaches.seed, stream=int(approaches.stream[i]), start=place.task.start,
+        ).rows  # fmt: skip
+        before = rows["phase"][rows["t_s"] < flown["t_impact_s"][i]]
+        phases.append(place.world.phase_name(int(before[-1])))
+    refused = flown["no_go"] == 1
+    return {
+        "before": phases.count("approach"),
+        "in_level_out": len(phases) - phases.count("approach"),
+        "refused": int(refused.sum()),
+        "clearance_m": float(np.sort(flown["d_min_m"][refused & ~np.isfinite(flown["t_impact_s"])])[0]),
+    }
 
 
 @dataclass(frozen=True)
@@ -273,4 +302,15 @@ def family(bench: Bench) -> Data:
     return found
 
 
-PARTS: dict[str, Callable[[Bench], Data]] = {"sensors": sensors, "gears": gears, "family": family, "forms": forms}
+def one_class(bench: Bench) -> Data:
+    """The one-class SVM with a network beside the default policy, over the box."""
+    ideal = bench.learned()
+    bench.say("one-class SVM")
+    return {
+        "box": policy_oneclass.compare(Place.of(ideal.tasks[0]), ideal.form, np.array(ideal.values), SEED, N_ONE_CLASS)
+    }
+
+
+PARTS: dict[str, Callable[[Bench], Data]] = {
+    "sensors": sensors, "go": go_no_go, "gears": gears, "family": family, "forms": forms, "one_class": one_class,
+}  # fmt: skip
