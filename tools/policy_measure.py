@@ -58,6 +58,7 @@ SENSORS = {
 }
 GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
 HARD = ("wide_long",)
+OTHER_FORMS = (("polynomial2", "wide_long"), ("bilinear", "wide_long"))
 FLOWN = ("vehicle=crazyflie21", "gear_set=table1")
 FORMS = ("polynomial2", "polynomial3", "bilinear")
 N_FAMILY, N_DRAWN = 6, 20
@@ -242,6 +243,9 @@ def gears(bench: Bench) -> Data:
     for gear in GEARS:
         policy = bench.learned(*(LONG if gear in HARD else (*QUICK, *OVER_BOX)), f"gear={gear}")
         found[f"habas2021, as_simulated, {gear}"] = {**about(policy), **beside_ceiling(bench, policy)}
+    for form, gear in OTHER_FORMS:
+        policy = bench.learned(*LONG, f"gear={gear}", f"form={form}")
+        found[f"habas2021, as_simulated, {gear}, `{form}`"] = {**about(policy), **beside_ceiling(bench, policy)}
     for gear in ("wide_short", "wide_long"):
         policy = bench.learned(*LONG, *FLOWN, f"gear={gear}")
         found[f"crazyflie21, table1, {gear}"] = {**about(policy), **beside_ceiling(bench, policy)}
