@@ -1,53 +1,65 @@
 /// @file ivl_approach.c
 #include "ivl_approach.h"
 
+#include <string.h>
+
 #include "ivl_math.h"
 
-// shape REGION: from the present velocity straight to the aim
-static void aim_anew(const ivl_cfg_t *cfg, ivl_approach_t *approach, const ivl_room_t *room)
+// a sensor with a measurement in every tick must not put the aim off for ever
+static const uint8_t PUT_OFF_MAX = 8u;
+
+void ivl_approach_begin(const ivl_cfg_t *cfg, ivl_approach_t *approach, ivl_vec3_t p_WB_m, ivl_vec3_t v_WB_mps, float speed_mps,
+                        float angle_rad)
 {
-    approach->aim = ivl_region_aim(cfg, room, approach->p_W_m, approach->from_W_mps, approach->asked);
-    const float dx = approach->aim.vx_mps - approach->from_W_mps.x, dz = approach->aim.vz_mps - approach->from_W_mps.z;
+    const ivl_sincos_t dir = ivl_sincos(angle_rad);
+    memset(approach, 0, sizeof *approach);
+    approach->p_W_m = p_WB_m;
+    approach->dir_x = dir.cos;
+    approach->dir_z = dir.sin;
+    approach->last_mps = cfg->shape_speed_norm * speed_mps;
+    approach->target_mps = (cfg->shape == (uint8_t)IVL_SHAPE_ACCELERATE) ? cfg->speed_mps_max : speed_mps;
+    approach->aim.vx_mps = approach->target_mps * dir.cos;
+    approach->aim.vz_mps = approach->target_mps * dir.sin;
+    approach->aim.accel_mps2 = cfg->approach_accel_mps2;
+    approach->speed_mps = v_WB_mps.x * dir.cos + v_WB_mps.z * dir.sin;
+    if (cfg->shape == (uint8_t)IVL_SHAPE_REGION)
+    {
+        // the present velocity, until there is an aim; the cosine of a right angle is not exactly 0
+        approach->asked.vx_mps = ivl_clamp(approach->aim.vx_mps, 0.0f, speed_mps);
+        approach->asked.vz_mps = ivl_clamp(approach->aim.vz_mps, 0.0f, speed_mps);
+        approach->from_x_mps = v_WB_mps.x;
+        approach->from_z_mps = v_WB_mps.z;
+        approach->speed_mps = 0.0f;
+        approach->target_mps = 0.0f;
+        approach->wants = IVL_APPROACH_AIM;
+    }
+}
+
+void ivl_approach_aim(const ivl_cfg_t *cfg, ivl_approach_t *approach, const ivl_room_t *room, bool busy)
+{
+    const bool knows = ivl_region_knows(cfg, room);
+    if ((approach->wants == (uint8_t)IVL_APPROACH_NOTHING) || ((approach->wants == (uint8_t)IVL_APPROACH_DISTANCE) && !knows))
+    {
+        return;
+    }
+    if (busy && (approach->n_put_off < PUT_OFF_MAX))
+    {
+        approach->n_put_off++;
+        return;
+    }
+    // from the present velocity straight to the aim
+    approach->from_x_mps += approach->dir_x * approach->speed_mps;
+    approach->from_z_mps += approach->dir_z * approach->speed_mps;
+    const ivl_vec3_t from = {approach->from_x_mps, 0.0f, approach->from_z_mps};
+    approach->aim = ivl_region_aim(cfg, room, approach->p_W_m, from, approach->asked);
+    const float dx = approach->aim.vx_mps - from.x, dz = approach->aim.vz_mps - from.z;
     const float dv_mps = sqrtf(dx * dx + dz * dz);
     approach->dir_x = (dv_mps > 0.0f) ? dx / dv_mps : 0.0f;
     approach->dir_z = (dv_mps > 0.0f) ? dz / dv_mps : 1.0f;
     approach->speed_mps = 0.0f;
     approach->target_mps = dv_mps;
-    approach->open = !ivl_region_knows(cfg, room);
-}
-
-void ivl_approach_begin(const ivl_cfg_t *cfg, ivl_approach_t *approach, const ivl_room_t *room, ivl_vec3_t p_WB_m, ivl_vec3_t v_WB_mps,
-                        float speed_mps, float angle_rad)
-{
-    const ivl_sincos_t dir = ivl_sincos(angle_rad);
-    const float        target_mps = (cfg->shape == (uint8_t)IVL_SHAPE_ACCELERATE) ? cfg->speed_mps_max : speed_mps;
-    *approach = (ivl_approach_t){
-        .p_W_m = p_WB_m,
-        .dir_x = dir.cos,
-        .dir_z = dir.sin,
-        .speed_mps = v_WB_mps.x * dir.cos + v_WB_mps.z * dir.sin,
-        .target_mps = target_mps,
-        .aim = {.vx_mps = target_mps * dir.cos, .vz_mps = target_mps * dir.sin, .accel_mps2 = cfg->approach_accel_mps2},
-        .last_mps = cfg->shape_speed_norm * speed_mps,
-    };
-    if (cfg->shape == (uint8_t)IVL_SHAPE_REGION)
-    {
-        // the cosine of a right angle is not exactly 0
-        approach->asked.vx_mps = ivl_clamp(approach->aim.vx_mps, 0.0f, speed_mps);
-        approach->asked.vz_mps = ivl_clamp(approach->aim.vz_mps, 0.0f, speed_mps);
-        approach->from_W_mps = ivl_vec3(v_WB_mps.x, 0.0f, v_WB_mps.z);
-        aim_anew(cfg, approach, room);
-    }
-}
-
-void ivl_approach_look(const ivl_cfg_t *cfg, ivl_approach_t *approach, const ivl_room_t *room)
-{
-    if (approach->open && ivl_region_knows(cfg, room))
-    {
-        approach->from_W_mps.x += approach->dir_x * approach->speed_mps;
-        approach->from_W_mps.z += approach->dir_z * approach->speed_mps;
-        aim_anew(cfg, approach, room);
-    }
+    approach->wants = (uint8_t)(knows ? IVL_APPROACH_NOTHING : IVL_APPROACH_DISTANCE);
+    approach->n_put_off = 0;
 }
 
 // RREV stays as it is while the speed falls with the distance: v' = -RREV v                                     [MODEL eq. 13.16]
@@ -92,8 +104,10 @@ ivl_reference_t ivl_approach_next(const ivl_cfg_t *cfg, ivl_approach_t *approach
     approach->speed_mps += dv_mps;
     if (cfg->shape == (uint8_t)IVL_SHAPE_REGION)
     {
-        ref.v_W_mps = ivl_add(ref.v_W_mps, approach->from_W_mps);
-        approach->p_W_m = ivl_add(approach->p_W_m, ivl_scale(approach->from_W_mps, dt_s));
+        ref.v_W_mps.x += approach->from_x_mps;
+        ref.v_W_mps.z += approach->from_z_mps;
+        approach->p_W_m.x += approach->from_x_mps * dt_s;
+        approach->p_W_m.z += approach->from_z_mps * dt_s;
     }
     return ref;
 }

@@ -6,54 +6,47 @@
 #include "ivl_pwm.h"
 #include "ivl_wire.h"
 
-#define ROW(ctype, group, name, field, unit, min, max, dflt, doc) ROW_##field,
-#define ENTRY(ctype, group, name, field, unit, min, max, dflt, doc)                                                                        \
-    {offsetof(ivl_cfg_t, field), sizeof(ctype), (float)(min), (float)(max), (float)(dflt)},
+#define ROW(ctype, group, name, field, unit, min, max, dflt, doc)     ROW_##field,
+#define RANGE(ctype, group, name, field, unit, min, max, dflt, doc)   {(float)(min), (float)(max)},
+#define DEFAULT(ctype, group, name, field, unit, min, max, dflt, doc) .field = (ctype)(dflt),
+#define PLACE(ctype, group, name, field, unit, min, max, dflt, doc)   {offsetof(ivl_cfg_t, field), sizeof(ctype)},
 
 enum
 {
     IVL_PARAMS(ROW) ROW_COUNT
 };
 
-// a member of one byte is a uint8_t, one of four a float
+// a member of one byte is a uint8_t, one of four a float; both numbers in two bytes
 typedef struct
 {
-    uint16_t offset, size;
-    float    min, max, dflt;
-} entry_t;
+    uint16_t offset : 13;
+    uint16_t size : 3;
+} place_t;
 
-static const entry_t ENTRIES[] = {IVL_PARAMS(ENTRY)};
-
-static float get(const ivl_cfg_t *cfg, const entry_t *e)
+typedef struct
 {
-    const uint8_t *at = (const uint8_t *)cfg + e->offset;
+    float min, max;
+} range_t;
+
+static const place_t PLACES[] = {IVL_PARAMS(PLACE)};
+static const range_t RANGES[] = {IVL_PARAMS(RANGE)};
+
+static const ivl_cfg_t DEFAULTS = {IVL_PARAMS(DEFAULT)};
+
+static float get(const ivl_cfg_t *cfg, int row)
+{
+    const uint8_t *at = (const uint8_t *)cfg + PLACES[row].offset;
     float          value = (float)*at;
-    if (e->size == sizeof value)
+    if (PLACES[row].size == sizeof value)
     {
         memcpy(&value, at, sizeof value);
     }
     return value;
 }
 
-static void set(ivl_cfg_t *cfg, const entry_t *e, float value)
-{
-    uint8_t *at = (uint8_t *)cfg + e->offset;
-    if (e->size == sizeof value)
-    {
-        memcpy(at, &value, sizeof value);
-    }
-    else
-    {
-        *at = (uint8_t)value;
-    }
-}
-
 void ivl_cfg_defaults(ivl_cfg_t *cfg)
 {
-    for (int row = 0; row < (int)ROW_COUNT; row++)
-    {
-        set(cfg, &ENTRIES[row], ENTRIES[row].dflt);
-    }
+    *cfg = DEFAULTS;
 }
 
 static int bad_range(const ivl_cfg_t *cfg)
@@ -61,8 +54,8 @@ static int bad_range(const ivl_cfg_t *cfg)
     for (int row = 0; row < (int)ROW_COUNT; row++)
     {
         // in positive form, so that NaN is refused
-        const float value = get(cfg, &ENTRIES[row]);
-        if (!((value >= ENTRIES[row].min) && (value <= ENTRIES[row].max)))
+        const float value = get(cfg, row);
+        if (!((value >= RANGES[row].min) && (value <= RANGES[row].max)))
         {
             return row;
         }
@@ -122,7 +115,7 @@ uint32_t ivl_cfg_crc(const ivl_cfg_t *cfg)
     uint32_t crc = 0;
     for (int row = 0; row < (int)ROW_COUNT; row++)
     {
-        crc = ivl_wire_crc(crc, (const uint8_t *)cfg + ENTRIES[row].offset, ENTRIES[row].size);
+        crc = ivl_wire_crc(crc, (const uint8_t *)cfg + PLACES[row].offset, PLACES[row].size);
     }
     return crc;
 }

@@ -151,19 +151,17 @@ static void filter_take(const ivl_cfg_t *cfg, ivl_distance_t *distance, measured
     filter_correct(cfg, distance, &innovation);
 }
 
-static ivl_ceiling_t filter_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance)
+static void filter_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, ivl_ceiling_t *ceiling)
 {
     const ivl_filter_t *filter = &distance->filter;
     const float         t_s = distance->since_s;
     const ivl_motion_t  gain = gained(distance, ivl_history_after(&distance->history, cfg->accel_delay_s), t_s);
     const float         dv_mps = filter->b_mps2 * t_s;
     const float         bias_m = distance->has_range ? cfg->range_bias_m : 0.0f;
-    return (ivl_ceiling_t){
-        .d_ceil_m = filter->d_m - (filter->v_mps - 0.5f * dv_mps) * t_s - gain.p_m,
-        .v_close_mps = filter->v_mps - dv_mps + gain.v_mps,
-        .d_sigma_m = sqrtf(ivl_filter_d_variance(filter, t_s, cfg->kf_q_m2ps3) + bias_m * bias_m),
-        .valid = distance->n_taken > 0u,
-    };
+    ceiling->d_ceil_m = filter->d_m - (filter->v_mps - 0.5f * dv_mps) * t_s - gain.p_m;
+    ceiling->v_close_mps = filter->v_mps - dv_mps + gain.v_mps;
+    ceiling->d_sigma_m = sqrtf(ivl_filter_d_variance(filter, t_s, cfg->kf_q_m2ps3) + bias_m * bias_m);
+    ceiling->valid = distance->n_taken > 0u;
 }
 
 // ---- formula
@@ -180,47 +178,38 @@ static void formula_take(const ivl_cfg_t *cfg, ivl_distance_t *distance, const m
 }
 
 // carried on from the instant that the low-passes show, with d' = -RREV d and the acceleration a = d (RREV' - RREV^2)
-static ivl_ceiling_t formula_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance)
+static void formula_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, ivl_ceiling_t *ceiling)
 {
     const ivl_formula_t         *formula = &distance->formula;
     const ivl_formula_distance_t at = ivl_formula_distance(cfg, formula);
     const float                  lag_s = distance->since_s + 0.5f * formula->period_s + cfg->rrev_tau_s;
     const float                  denom_per_s2 = formula->rate_per_s2 - formula->rrev_per_s * formula->rrev_per_s;
     const float                  left_norm = 1.0f - lag_s * (formula->rrev_per_s + 0.5f * lag_s * denom_per_s2);
-    return (ivl_ceiling_t){
-        .d_ceil_m = at.d_m * left_norm,
-        .v_close_mps = at.d_m * (formula->rrev_per_s + lag_s * denom_per_s2),
-        .d_sigma_m = at.sigma_m * left_norm,
-        .valid = at.valid,
-    };
+    ceiling->d_ceil_m = at.d_m * left_norm;
+    ceiling->v_close_mps = at.d_m * (formula->rrev_per_s + lag_s * denom_per_s2);
+    ceiling->d_sigma_m = at.sigma_m * left_norm;
+    ceiling->valid = at.valid;
 }
 
 // ---- ranging sensor
 
-static ivl_ceiling_t range_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, const ivl_sense_t *sense)
+static void range_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, const ivl_sense_t *sense, ivl_ceiling_t *ceiling)
 {
     const float v_mps = sense->sample.v_WB_mps.z;
     const float drift_m = cfg->kf_v_sigma_mps * distance->since_s;
-    return (ivl_ceiling_t){
-        .d_ceil_m = distance->range_d_m - v_mps * distance->since_s,
-        .v_close_mps = v_mps,
-        .d_sigma_m = sqrtf(cfg->range_sigma_m * cfg->range_sigma_m + cfg->range_bias_m * cfg->range_bias_m + drift_m * drift_m),
-        .valid = distance->n_taken > 0u,
-    };
+    ceiling->d_ceil_m = distance->range_d_m - v_mps * distance->since_s;
+    ceiling->v_close_mps = v_mps;
+    ceiling->d_sigma_m = sqrtf(cfg->range_sigma_m * cfg->range_sigma_m + cfg->range_bias_m * cfg->range_bias_m + drift_m * drift_m);
+    ceiling->valid = distance->n_taken > 0u;
 }
 
 // ---- the stage
 
-static ivl_ceiling_t checked(const ivl_cfg_t *cfg, ivl_ceiling_t ceiling, float age_s)
+static bool good(const ivl_cfg_t *cfg, const ivl_ceiling_t *ceiling, float age_s)
 {
     // in positive form: what is no number is invalid
-    if (ceiling.valid && (ceiling.d_ceil_m >= cfg->d_ceil_m_min) && (ceiling.d_ceil_m <= cfg->d_ceil_m_max) &&
-        (ceiling.d_sigma_m >= 0.0f) && (ceiling.d_sigma_m <= cfg->d_sigma_norm_max * ceiling.d_ceil_m) && (age_s <= cfg->d_old_s_max))
-    {
-        ceiling.age_s = age_s;
-        return ceiling;
-    }
-    return (ivl_ceiling_t){.age_s = age_s};
+    return ceiling->valid && (ceiling->d_ceil_m >= cfg->d_ceil_m_min) && (ceiling->d_ceil_m <= cfg->d_ceil_m_max) &&
+           (ceiling->d_sigma_m >= 0.0f) && (ceiling->d_sigma_m <= cfg->d_sigma_norm_max * ceiling->d_ceil_m) && (age_s <= cfg->d_old_s_max);
 }
 
 static void take(const ivl_cfg_t *cfg, ivl_distance_t *distance, const ivl_sense_t *sense, measured_t what, const measurement_t *m)
@@ -246,17 +235,21 @@ static void take(const ivl_cfg_t *cfg, ivl_distance_t *distance, const ivl_sense
 
 static ivl_ceiling_t show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, const ivl_sense_t *sense)
 {
-    switch ((ivl_source_t)cfg->d_source)
+    const float   age_s = distance->since_s;
+    ivl_ceiling_t ceiling = {.age_s = age_s};
+    if (cfg->d_source == (uint8_t)IVL_SOURCE_FORMULA)
     {
-    case IVL_SOURCE_FORMULA:
-        return formula_show(cfg, distance);
-    case IVL_SOURCE_FILTER:
-        return filter_show(cfg, distance);
-    case IVL_SOURCE_RANGE:
-    case IVL_SOURCE_HEIGHT:
-    default:
-        return range_show(cfg, distance, sense);
+        formula_show(cfg, distance, &ceiling);
     }
+    else if (cfg->d_source == (uint8_t)IVL_SOURCE_FILTER)
+    {
+        filter_show(cfg, distance, &ceiling);
+    }
+    else
+    {
+        range_show(cfg, distance, sense, &ceiling);
+    }
+    return good(cfg, &ceiling, age_s) ? ceiling : (ivl_ceiling_t){.age_s = age_s};
 }
 
 ivl_ceiling_t ivl_distance_update(const ivl_cfg_t *cfg, ivl_distance_t *distance, const ivl_sense_t *sense, const ivl_in_t *in,
@@ -266,6 +259,7 @@ ivl_ceiling_t ivl_distance_update(const ivl_cfg_t *cfg, ivl_distance_t *distance
     {
         return ivl_ceiling_compute(cfg, sense);
     }
+    distance->measured = false;
     if (!is_approach)
     {
         distance->running = false;
@@ -285,13 +279,11 @@ ivl_ceiling_t ivl_distance_update(const ivl_cfg_t *cfg, ivl_distance_t *distance
         return (ivl_ceiling_t){0};
     }
     measurement_t m;
-    if (read_rrev(cfg, distance, in, &m))
+    const bool    is_rrev = read_rrev(cfg, distance, in, &m);
+    distance->measured = is_rrev || read_range(cfg, distance, in, &m);
+    if (distance->measured)
     {
-        take(cfg, distance, sense, MEASURED_RREV, &m);
+        take(cfg, distance, sense, is_rrev ? MEASURED_RREV : MEASURED_RANGE, &m);
     }
-    else if (read_range(cfg, distance, in, &m))
-    {
-        take(cfg, distance, sense, MEASURED_RANGE, &m);
-    }
-    return checked(cfg, show(cfg, distance, sense), distance->since_s);
+    return show(cfg, distance, sense);
 }

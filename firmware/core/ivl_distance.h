@@ -19,6 +19,7 @@ typedef enum
 typedef struct
 {
     bool          running;
+    bool          measured;  ///< this tick has looked at a measurement
     ivl_history_t history;
     ivl_motion_t  motion;   ///< history's integrals at the instant of the estimate
     float         since_s;  ///< from that instant to this tick

@@ -47,11 +47,11 @@ static float along_z(const float row[], place_t z)
 
 static ivl_action_t decide(const float theta[], const ivl_seen_t *seen)
 {
-    const ivl_sensed_t v = ivl_general_sensed(seen);
-    const place_t      x = place(v.vx_mps * PER_STEP_X, NODES_X), z = place(v.vz_mps * PER_STEP_Z, NODES_Z);
-    const float       *row = theta + x.node * NODES_Z;
-    const float        low = along_z(row, z), high = along_z(row + NODES_Z, z);
-    return ivl_general_action(theta + REST, seen, ivl_general_point(v), low + x.part * (high - low));
+    const ivl_point_t p = ivl_general_point(seen);
+    const place_t     x = place(p.vx_mps * PER_STEP_X, NODES_X), z = place(p.vz_mps * PER_STEP_Z, NODES_Z);
+    const float      *row = theta + x.node * NODES_Z;
+    const float       low = along_z(row, z), high = along_z(row + NODES_Z, z);
+    return ivl_general_action(theta + REST, seen, p.x, p.z, low + x.part * (high - low));
 }
 
 static float moment_most_Nm(const float theta[])

@@ -21,8 +21,8 @@ static const ivl_form_group_t GROUPS[] = {
 
 static ivl_action_t decide(const float theta[], const ivl_seen_t *seen)
 {
-    const ivl_point_t p = ivl_general_point(ivl_general_sensed(seen));
-    return ivl_general_action(theta + REST, seen, p, ivl_general_poly3(theta + THRESHOLD, p));
+    const ivl_point_t p = ivl_general_point(seen);
+    return ivl_general_action(theta + REST, seen, p.x, p.z, ivl_general_poly3(theta + THRESHOLD, p.x, p.z));
 }
 
 static float moment_most_Nm(const float theta[])

@@ -6,28 +6,22 @@
 #include "ivl_form.h"
 
 /// The sensed velocities (closing v_z = RREV d, along the ceiling v_x = -OF_y d), limited to 0..5 m/s: forms know nothing beyond.
-typedef struct
-{
-    float vx_mps, vz_mps;
-} ivl_sensed_t;
-
-/// The same as coordinates without a unit, about 0 in the middle of the approaches that are flown:
+/// x and z are the same as coordinates without a unit, about 0 in the middle of the approaches that are flown:
 /// x = (v_x - 1.4 m/s) / (2 m/s), z = (v_z - 1.6 m/s) / (2 m/s).
 typedef struct
 {
-    float x, z;
+    float vx_mps, vz_mps, x, z;
 } ivl_point_t;
 
 #define IVL_GENERAL_V_MPS_MAX 5.0f
 
-ivl_sensed_t ivl_general_sensed(const ivl_seen_t *seen);
-ivl_point_t  ivl_general_point(ivl_sensed_t v);
+ivl_point_t ivl_general_point(const ivl_seen_t *seen);
 
 /// Polynomial of the second degree, 6 coefficients: 1, x, z, xx, xz, zz.
-float ivl_general_poly2(const float c[], ivl_point_t p);
+float ivl_general_poly2(const float c[], float x, float z);
 
 /// Polynomial of the third degree, 10 coefficients: those of poly2, then xxx, xxz, xzz, zzz.
-float ivl_general_poly3(const float c[], ivl_point_t p);
+float ivl_general_poly3(const float c[], float x, float z);
 
 // ---- the second half of each form's parameters
 
@@ -49,7 +43,7 @@ float ivl_general_poly3(const float c[], ivl_point_t p);
 
 /// The action of a form whose threshold is known.
 /// @param[in] rest  the IVL_GENERAL_N parameters behind those of the threshold
-ivl_action_t ivl_general_action(const float rest[], const ivl_seen_t *seen, ivl_point_t p, float threshold_per_s);
+ivl_action_t ivl_general_action(const float rest[], const ivl_seen_t *seen, float x, float z, float threshold_per_s);
 
 /// Largest moment of any p: the moment is linear, so it is that of a corner.
 float ivl_general_moment_most_Nm(const float rest[]);

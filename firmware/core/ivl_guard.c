@@ -2,7 +2,6 @@
 /// The rules.  Read the table first; docs/SAFETY.md says on which property of the vehicle each row rests.
 #include "ivl_guard.h"
 
-#include "ivl_level_out.h"
 #include "ivl_math.h"
 
 // ---- conditions: pure questions about this tick.  Written in positive form and negated, so that a NaN counts as the bad case.
@@ -204,7 +203,8 @@ CONDITION(cue_invalid)
 
 CONDITION(would_not_land)
 {
-    return !state->action.go && ivl_level_out_asked(cfg, state, seen);
+    UNUSED(cfg), UNUSED(seen);
+    return !state->action.go && state->decision.asked;
 }
 
 // ---- the table: the first row that holds counts
@@ -264,39 +264,39 @@ CONDITION(would_not_land)
     X(with, NO_GO,         "no_go",         APPROACH,      would_not_land,     LEVEL,  SCORED)
 // clang-format on
 
+// packed into two words
 typedef struct
 {
-    const char *name;
-    uint32_t    phases;
     condition_t when;
-    uint8_t     act;  // ivl_act_t; a byte, so that a row stays one of four words
+    uint16_t    phases;  // bits
+    uint8_t     act;     // ivl_act_t
     bool        discards;
 } row_t;
 
-#define ROW(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = {name, phases, when, IVL_ACT_##act, discards},
+#define ROW(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = {when, phases, IVL_ACT_##act, discards},
 static const row_t ROWS[] = {RULES(ROW, )};
 
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_RULE_COUNT, "one row a rule");
 _Static_assert(IVL_RULE_COUNT <= 255, "a rule is logged in one byte");
 
-// first row of the table that names a phase: those before it need no look
-#define OR_FIRST(with, id, name, phases, when, act, discards) (((phases) & (with)) != 0u) ? (uint8_t)IVL_RULE_##id:
-#define FIRST_OF(phase)                                       (RULES(OR_FIRST, 1u << (phase))(uint8_t) IVL_RULE_COUNT)
-static const uint8_t FIRST[] = {
-    [IVL_PHASE_IDLE] = FIRST_OF(IVL_PHASE_IDLE),           [IVL_PHASE_READY] = FIRST_OF(IVL_PHASE_READY),
-    [IVL_PHASE_APPROACH] = FIRST_OF(IVL_PHASE_APPROACH),   [IVL_PHASE_FLIP] = FIRST_OF(IVL_PHASE_FLIP),
-    [IVL_PHASE_COAST] = FIRST_OF(IVL_PHASE_COAST),         [IVL_PHASE_ATTACHED] = FIRST_OF(IVL_PHASE_ATTACHED),
-    [IVL_PHASE_DONE] = FIRST_OF(IVL_PHASE_DONE),           [IVL_PHASE_ABORTED] = FIRST_OF(IVL_PHASE_ABORTED),
-    [IVL_PHASE_LEVEL_OUT] = FIRST_OF(IVL_PHASE_LEVEL_OUT),
+// bits of the rows that name a phase: the others need no look
+#define BIT_IF(with, id, name, phases, when, act, discards) | ((((phases) & (with)) != 0u) ? 1u << IVL_RULE_##id : 0u)
+#define ROWS_OF(phase)                                      [phase] = 0u RULES(BIT_IF, 1u << (phase))
+static const uint32_t OF_PHASE[] = {
+    ROWS_OF(IVL_PHASE_IDLE), ROWS_OF(IVL_PHASE_READY),   ROWS_OF(IVL_PHASE_APPROACH),
+    ROWS_OF(IVL_PHASE_FLIP), ROWS_OF(IVL_PHASE_COAST),   ROWS_OF(IVL_PHASE_ATTACHED),
+    ROWS_OF(IVL_PHASE_DONE), ROWS_OF(IVL_PHASE_ABORTED), ROWS_OF(IVL_PHASE_LEVEL_OUT),
 };
-_Static_assert(sizeof FIRST / sizeof FIRST[0] == (size_t)IVL_PHASE_COUNT, "one entry a phase");
+_Static_assert(sizeof OF_PHASE / sizeof OF_PHASE[0] == (size_t)IVL_PHASE_COUNT, "one entry a phase");
+_Static_assert(IVL_RULE_COUNT <= 32, "one bit a rule");
 
 ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 {
-    const uint32_t phase = 1u << state->phase;
-    for (int i = (int)FIRST[state->phase]; i < (int)IVL_RULE_COUNT; i++)
+    for (uint32_t left = OF_PHASE[state->phase]; left != 0u; left &= left - 1u)
     {
-        if (((ROWS[i].phases & phase) != 0u) && ROWS[i].when(cfg, state, seen))
+        // the lowest bit that is left
+        const int i = __builtin_ctz(left);
+        if (ROWS[i].when(cfg, state, seen))
         {
             return (ivl_rule_t)i;
         }
@@ -324,10 +324,15 @@ bool ivl_guard_applies(ivl_rule_t rule, ivl_phase_t phase)
     return is_rule(rule) && ((unsigned)phase < (unsigned)IVL_PHASE_COUNT) && ((ROWS[rule].phases & (1u << phase)) != 0u);
 }
 
+#ifndef IVL_NO_TEXT
+#define NAME(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = (name),
+static const char *const NAMES[] = {RULES(NAME, )};
+
 const char *ivl_guard_name(ivl_rule_t rule)
 {
-    return is_rule(rule) ? ROWS[rule].name : "?";
+    return is_rule(rule) ? NAMES[rule] : "?";
 }
+#endif
 
 // ---- lock-out
 

@@ -31,8 +31,10 @@ bool ivl_guard_discards(ivl_rule_t rule);
 /// True if the row of this rule names this phase.
 bool ivl_guard_applies(ivl_rule_t rule, ivl_phase_t phase);
 
+#ifndef IVL_NO_TEXT
 /// Lower-case name of a rule ("battery"), "?" for a number that is none.  Static storage.
 const char *ivl_guard_name(ivl_rule_t rule);
+#endif
 
 /// Re-arm lock-out, once per tick after the phase is known.  It begins with the trigger, and when ABORTED has cut the motors.  It ends with a
 /// new arm cycle, or in IDLE once the vehicle has rested upright for rearm_s while the autopilot around the core asks for no thrust.

@@ -54,14 +54,13 @@ void ivl_level_out_begin(ivl_state_t *state)
 static void turn(ivl_state_t *state)
 {
     const ivl_sample_t *sample = &state->sense.sample;
-    const ivl_vec3_t    v = {sample->v_WB_mps.x, sample->v_WB_mps.y, 0.0f};
-    const float         speed_mps = sqrtf(ivl_dot(v, v));
-    state->level.rises = false;
-    state->level.speed_mps = speed_mps;
-    state->level.dir_W = (speed_mps > 0.0f) ? ivl_scale(v, 1.0f / speed_mps) : ivl_vec3(1.0f, 0.0f, 0.0f);
+    ivl_level_t        *level = &state->level;
+    level->rises = false;
+    level->vx_mps = sample->v_WB_mps.x;
+    level->vy_mps = sample->v_WB_mps.y;
     state->p_hold_W_m = sample->p_WB_m;
     const float z_most_m = sample->p_WB_m.z - DROP_M;
-    state->level.z_W_m = (state->level.z_W_m < z_most_m) ? state->level.z_W_m : z_most_m;
+    level->z_W_m = (level->z_W_m < z_most_m) ? level->z_W_m : z_most_m;
 }
 
 // no error of position or velocity is left to the controller: it keeps the vehicle level, with the least thrust that it has
@@ -76,6 +75,29 @@ static bool descends(const ivl_state_t *state)
     return state->p_hold_W_m.z > state->level.z_W_m;
 }
 
+// along the ceiling the speed falls by a constant acceleration, its direction stays
+static ivl_reference_t brake(const ivl_cfg_t *cfg, ivl_state_t *state)
+{
+    ivl_level_t          *level = &state->level;
+    ivl_vec3_t           *hold = &state->p_hold_W_m;
+    const float           dt_s = state->derived.dt_s, vx = level->vx_mps, vy = level->vy_mps;
+    const float           speed_mps = sqrtf(vx * vx + vy * vy), dv_mps = cfg->approach_accel_mps2 * dt_s;
+    const float           lost = (speed_mps > dv_mps) ? dv_mps / speed_mps : 1.0f;
+    const float           fall_mps = descends(state) ? DESCENT_MPS : 0.0f;
+    const ivl_reference_t ref = {
+        .p_W_m = *hold,
+        .v_W_mps = {vx, vy, -fall_mps},
+        .a_W_mps2 = {-lost * vx * cfg->tick_hz, -lost * vy * cfg->tick_hz, 0.0f},
+    };
+    hold->x += (1.0f - 0.5f * lost) * vx * dt_s;
+    hold->y += (1.0f - 0.5f * lost) * vy * dt_s;
+    hold->z -= fall_mps * dt_s;
+    level->vx_mps = vx - lost * vx;
+    level->vy_mps = vy - lost * vy;
+    level->rest_s += ivl_level_out_rests(state) ? dt_s : 0.0f;
+    return ref;
+}
+
 ivl_reference_t ivl_level_out_next(const ivl_cfg_t *cfg, ivl_state_t *state)
 {
     const ivl_sample_t *sample = &state->sense.sample;
@@ -83,28 +105,11 @@ ivl_reference_t ivl_level_out_next(const ivl_cfg_t *cfg, ivl_state_t *state)
     {
         turn(state);
     }
-    if (state->level.rises)
-    {
-        return rise(cfg, sample);
-    }
-    ivl_level_t    *level = &state->level;
-    const float     dt_s = state->derived.dt_s;
-    const float     dv_mps = ivl_clamp(cfg->approach_accel_mps2 * dt_s, 0.0f, level->speed_mps);
-    const float     fall_mps = descends(state) ? DESCENT_MPS : 0.0f;
-    ivl_reference_t ref = {
-        .p_W_m = state->p_hold_W_m,
-        .v_W_mps = ivl_scale(level->dir_W, level->speed_mps),
-        .a_W_mps2 = ivl_scale(level->dir_W, -dv_mps * cfg->tick_hz),
-    };
-    ref.v_W_mps.z = -fall_mps;
-    state->p_hold_W_m = ivl_add(state->p_hold_W_m, ivl_scale(level->dir_W, (level->speed_mps - 0.5f * dv_mps) * dt_s));
-    state->p_hold_W_m.z -= fall_mps * dt_s;
-    level->speed_mps -= dv_mps;
-    level->rest_s += ivl_level_out_rests(state) ? dt_s : 0.0f;
-    return ref;
+    return state->level.rises ? rise(cfg, sample) : brake(cfg, state);
 }
 
 bool ivl_level_out_rests(const ivl_state_t *state)
 {
-    return !state->level.rises && !(state->level.speed_mps > 0.0f) && !descends(state);
+    const ivl_level_t *level = &state->level;
+    return !level->rises && !(fabsf(level->vx_mps) + fabsf(level->vy_mps) > 0.0f) && !descends(state);
 }

@@ -2,6 +2,8 @@
 /// The polynomials are minimax fits of this project, rounded to single precision; those of sine, cosine and tangent on [0, (pi/4)^2] in z = x^2.
 #include "ivl_math.h"
 
+#include <string.h>
+
 // pi/2 in three parts; the first two have so few bits that small integer multiples of them are exact
 static const float HALF_PI_1 = 1.5703125f;
 static const float HALF_PI_2 = 4.837512969970703e-4f;
@@ -21,6 +23,11 @@ static float sin_poly(float x, float z)
 static float cos_poly(float z)
 {
     return 1.0f - 0.5f * z + z * z * (4.166664687e-2f + z * (-1.388736752e-3f + z * 2.443845160e-5f));
+}
+
+bool ivl_vec3_within(ivl_vec3_t a, float limit)
+{
+    return ivl_within(a.x, limit) && ivl_within(a.y, limit) && ivl_within(a.z, limit);
 }
 
 ivl_sincos_t ivl_sincos(float x_rad)
@@ -81,15 +88,12 @@ static float exp_poly(float x)
     return 1.0f + x + x * x * (0.49999148f + x * (0.16666457f + x * (4.1898277e-2f + x * 8.37464e-3f)));
 }
 
-// 2^n for n in -60..0: halving is exact
-static float power_of_half(int n)
+// 2^n for n in -60..0: the exponent of a single-precision number, 127 for 1
+static float power_of_two(int n)
 {
-    float power = 1.0f, half = 0.5f;
-    for (unsigned k = (unsigned)(-n); k != 0u; k >>= 1u)
-    {
-        power = ((k & 1u) != 0u) ? power * half : power;
-        half = half * half;
-    }
+    const uint32_t bits = (uint32_t)(127 + n) << 23;
+    float          power;
+    memcpy(&power, &bits, sizeof power);
     return power;
 }
 
@@ -100,7 +104,7 @@ float ivl_logistic(float x)
     const float a = -fabsf(s);
     const int   n = (int)(a * LOG2_E - 0.5f);
     const float k = (float)n;
-    const float e = exp_poly((a - k * LN_2_1) - k * LN_2_2) * power_of_half(n);
+    const float e = exp_poly((a - k * LN_2_1) - k * LN_2_2) * power_of_two(n);
     const float low = e / (1.0f + e);
     return (s < 0.0f) ? low : 1.0f - low;
 }

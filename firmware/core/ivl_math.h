@@ -63,12 +63,6 @@ static inline ivl_vec3_t ivl_cross(ivl_vec3_t a, ivl_vec3_t b)
     return ivl_vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
 }
 
-/// True if every component lies in [-limit, limit]; false for NaN.
-static inline bool ivl_vec3_within(ivl_vec3_t a, float limit)
-{
-    return ivl_within(a.x, limit) && ivl_within(a.y, limit) && ivl_within(a.z, limit);
-}
-
 /// Body axes in W of a unit quaternion q_WB.
 static inline ivl_axes_t ivl_axes_of(ivl_quat_t q_WB)
 {
@@ -82,6 +76,9 @@ static inline ivl_axes_t ivl_axes_of(ivl_quat_t q_WB)
         .z = {xz + wy, yz - wx, 1.0f - (xx + yy)},
     };
 }
+
+/// True if every component lies in [-limit, limit]; false for NaN.
+bool ivl_vec3_within(ivl_vec3_t a, float limit);
 
 /// Sine and cosine, absolute error below 1.5e-7 for |x| <= 100 rad; {0, 1} for anything else, NaN included.
 ivl_sincos_t ivl_sincos(float x_rad);

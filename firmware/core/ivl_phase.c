@@ -32,7 +32,7 @@ static bool fresh(const ivl_state_t *state)
 
 static bool rule_says(const ivl_state_t *state, ivl_act_t act)
 {
-    return ivl_guard_act((ivl_rule_t)state->guard.rule) == act;
+    return state->guard.act == (uint8_t)act;
 }
 
 CONDITION(request_idle)
@@ -66,32 +66,6 @@ CONDITION(may_approach)
     return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && fresh(state) && elapsed(state, cfg->ready_s_min);
 }
 
-// ---- conditions: what the rules say
-
-CONDITION(must_abort)
-{
-    UNUSED(cfg), UNUSED(seen);
-    return rule_says(state, IVL_ACT_ABORT);
-}
-
-CONDITION(must_attach)
-{
-    UNUSED(cfg), UNUSED(seen);
-    return rule_says(state, IVL_ACT_ATTACH);
-}
-
-CONDITION(must_cut)
-{
-    UNUSED(cfg), UNUSED(seen);
-    return rule_says(state, IVL_ACT_CUT);
-}
-
-CONDITION(must_level_out)
-{
-    UNUSED(cfg), UNUSED(seen);
-    return rule_says(state, IVL_ACT_LEVEL);
-}
-
 // ---- conditions: the landing
 
 // a vehicle that still rises towards the ceiling is not to be steered anywhere
@@ -121,59 +95,62 @@ CONDITION(attached_over)
 
 // ---- the table
 
-#define EXITS_MAX 6
-
+// taken when its condition holds, or, without one, when the rule that holds says so; neither of them: the end of a list
 typedef struct
 {
-    condition_t when;  // NULL ends the list
-    ivl_phase_t next;
+    condition_t when;
+    uint8_t     act;   // ivl_act_t
+    uint8_t     next;  // ivl_phase_t
 } exit_t;
 
 typedef struct
 {
-    const char *name;
-    ivl_drive_t drive;
-    exit_t      exits[EXITS_MAX + 1];  // the first one whose condition holds is taken
+    const exit_t *exits;  // the first one that is taken counts
+    uint8_t       drive;  // ivl_drive_t
 } row_t;
 
-// A request to abort does nothing once the trigger has fired: half a flip is worse than a whole one.  IDLE is the kill switch of every phase.
 // clang-format off
+#define ON(condition, phase) {.when = (condition), .next = IVL_PHASE_##phase}
+#define RULE(says, phase)    {.act = IVL_ACT_##says, .next = IVL_PHASE_##phase}
+#define EXITS(...)           (const exit_t[]) {__VA_ARGS__, {.when = NULL}}
+
+// A request to abort does nothing once the trigger has fired: half a flip is worse than a whole one.  IDLE is the kill switch of every phase.
 static const row_t ROWS[] = {
-    [IVL_PHASE_IDLE] = {"idle", IVL_DRIVE_OFF,
-        {{may_arm,           IVL_PHASE_READY}}},
-    [IVL_PHASE_READY] = {"ready", IVL_DRIVE_HOVER,
-        {{request_idle,      IVL_PHASE_IDLE},
-         {request_abort,     IVL_PHASE_ABORTED},
-         {must_abort,        IVL_PHASE_ABORTED},
-         {may_approach,      IVL_PHASE_APPROACH}}},
-    [IVL_PHASE_APPROACH] = {"approach", IVL_DRIVE_APPROACH,
-        {{request_idle,      IVL_PHASE_IDLE},
-         {request_abort,     IVL_PHASE_ABORTED},
-         {must_abort,        IVL_PHASE_ABORTED},
-         {request_hover,     IVL_PHASE_READY},
-         {must_level_out,    IVL_PHASE_LEVEL_OUT},
-         {triggered,         IVL_PHASE_FLIP}}},
-    [IVL_PHASE_FLIP] = {"flip", IVL_DRIVE_FLIP,
-        {{request_idle,      IVL_PHASE_IDLE},
-         {must_attach,       IVL_PHASE_ATTACHED},
-         {must_cut,          IVL_PHASE_COAST},
-         {inverted,          IVL_PHASE_COAST}}},
-    [IVL_PHASE_COAST] = {"coast", IVL_DRIVE_OFF,
-        {{request_idle,      IVL_PHASE_IDLE},
-         {must_attach,       IVL_PHASE_ATTACHED},
-         {must_cut,          IVL_PHASE_DONE}}},
-    [IVL_PHASE_ATTACHED] = {"attached", IVL_DRIVE_OFF,
-        {{request_idle,      IVL_PHASE_IDLE},
-         {attached_over,     IVL_PHASE_DONE}}},
-    [IVL_PHASE_DONE] = {"done", IVL_DRIVE_OFF,
-        {{request_idle,      IVL_PHASE_IDLE}}},
-    [IVL_PHASE_ABORTED] = {"aborted", IVL_DRIVE_LAND,
-        {{request_idle,      IVL_PHASE_IDLE}}},
-    [IVL_PHASE_LEVEL_OUT] = {"level_out", IVL_DRIVE_LEVEL,
-        {{request_idle,      IVL_PHASE_IDLE},
-         {request_abort,     IVL_PHASE_ABORTED},
-         {must_abort,        IVL_PHASE_ABORTED},
-         {hover_after_rise,  IVL_PHASE_READY}}},
+    [IVL_PHASE_IDLE] = {EXITS(
+        ON(may_arm,          READY)), IVL_DRIVE_OFF},
+    [IVL_PHASE_READY] = {EXITS(
+        ON(request_idle,     IDLE),
+        ON(request_abort,    ABORTED),
+        RULE(ABORT,          ABORTED),
+        ON(may_approach,     APPROACH)), IVL_DRIVE_HOVER},
+    [IVL_PHASE_APPROACH] = {EXITS(
+        ON(request_idle,     IDLE),
+        ON(request_abort,    ABORTED),
+        RULE(ABORT,          ABORTED),
+        ON(request_hover,    READY),
+        RULE(LEVEL,          LEVEL_OUT),
+        ON(triggered,        FLIP)), IVL_DRIVE_APPROACH},
+    [IVL_PHASE_FLIP] = {EXITS(
+        ON(request_idle,     IDLE),
+        RULE(ATTACH,         ATTACHED),
+        RULE(CUT,            COAST),
+        ON(inverted,         COAST)), IVL_DRIVE_FLIP},
+    [IVL_PHASE_COAST] = {EXITS(
+        ON(request_idle,     IDLE),
+        RULE(ATTACH,         ATTACHED),
+        RULE(CUT,            DONE)), IVL_DRIVE_OFF},
+    [IVL_PHASE_ATTACHED] = {EXITS(
+        ON(request_idle,     IDLE),
+        ON(attached_over,    DONE)), IVL_DRIVE_OFF},
+    [IVL_PHASE_DONE] = {EXITS(
+        ON(request_idle,     IDLE)), IVL_DRIVE_OFF},
+    [IVL_PHASE_ABORTED] = {EXITS(
+        ON(request_idle,     IDLE)), IVL_DRIVE_LAND},
+    [IVL_PHASE_LEVEL_OUT] = {EXITS(
+        ON(request_idle,     IDLE),
+        ON(request_abort,    ABORTED),
+        RULE(ABORT,          ABORTED),
+        ON(hover_after_rise, READY)), IVL_DRIVE_LEVEL},
 };
 // clang-format on
 
@@ -194,14 +171,6 @@ static void enter_ready(ivl_state_t *state)
     memset(&state->decision, 0, sizeof state->decision);
 }
 
-static void begin_approach(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
-{
-    const ivl_sense_t *sense = &state->sense;
-    const ivl_room_t   room = ivl_state_room(state, seen);
-    ivl_approach_begin(cfg, &state->approach, &room, sense->sample.p_WB_m, sense->sample.v_WB_mps, sense->cmd.speed_mps,
-                       sense->cmd.angle_rad);
-}
-
 static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, const ivl_seen_t *seen)
 {
     const ivl_sample_t *sample = &state->sense.sample;
@@ -215,12 +184,12 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
         break;
     case IVL_PHASE_APPROACH:
         memset(&state->decision, 0, sizeof state->decision);
-        begin_approach(cfg, state, seen);
+        ivl_approach_begin(cfg, &state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
         break;
     case IVL_PHASE_FLIP:
         state->triggered = true;
         state->diag.n_trigger++;
-        state->snapshot = ivl_trigger_snapshot(sample, seen, state->policy.id, state->action);
+        ivl_trigger_snapshot(&state->snapshot, sample, seen, &state->policy.id, &state->action);
         break;
     case IVL_PHASE_ABORTED:
         state->p_hold_W_m = sample->p_WB_m;
@@ -252,38 +221,51 @@ static void note_cause(ivl_state_t *state)
 }
 
 // go or no-go is decided once: after a go at the last moment there is no way back, so the flip is no longer asked about
-static void decide_once(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
+static void decide_once(ivl_state_t *state, const ivl_seen_t *seen)
 {
-    const bool may = (state->phase == IVL_PHASE_APPROACH) && (rule_says(state, IVL_ACT_NONE) || rule_says(state, IVL_ACT_LEVEL));
-    if (may && ivl_level_out_asked(cfg, state, seen))
+    ivl_decision_t *decision = &state->decision;
+    if (decision->asked && (rule_says(state, IVL_ACT_NONE) || rule_says(state, IVL_ACT_LEVEL)))
     {
-        state->decision = (ivl_decision_t){
-            .made = true,
-            .go = state->action.go,
-            .p_land = state->action.p_land,
-            .d_ceil_m = seen->ceiling.d_ceil_m,
-        };
+        decision->made = true;
+        decision->go = state->action.go;
+        decision->p_land = state->action.p_land;
+        decision->d_ceil_m = seen->ceiling.d_ceil_m;
     }
+}
+
+static bool taken(const exit_t *e, const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
+{
+    return (e->when != NULL) ? e->when(cfg, state, seen) : (e->act == state->guard.act);
+}
+
+static bool ends(const exit_t *e)
+{
+    return (e->when == NULL) && (e->act == (uint8_t)IVL_ACT_NONE);
 }
 
 static bool take_exit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
 {
+    state->decision.asked = false;
     if (state->phase == IVL_PHASE_APPROACH)
     {
         state->action = ivl_policy_decide(&state->policy, seen);
+        state->decision.asked = ivl_level_out_asked(cfg, state, seen);
     }
-    state->guard.rule = (uint8_t)ivl_guard_find(cfg, state, seen);
-    decide_once(cfg, state, seen);
-    for (const exit_t *e = ROWS[state->phase].exits; e->when != NULL; e++)
+    const ivl_rule_t rule = ivl_guard_find(cfg, state, seen);
+    state->guard.rule = (uint8_t)rule;
+    state->guard.act = (uint8_t)ivl_guard_act(rule);
+    decide_once(state, seen);
+    for (const exit_t *e = ROWS[state->phase].exits; !ends(e); e++)
     {
-        if (e->when(cfg, state, seen))
+        if (taken(e, cfg, state, seen))
         {
             if (state->phase != IVL_PHASE_IDLE)
             {
                 note_cause(state);
             }
-            enter(cfg, state, e->next, seen);
-            return true;
+            enter(cfg, state, (ivl_phase_t)e->next, seen);
+            // all that could end a level-out was already asked: its rules and requests are among those of the approach
+            return e->next != (uint8_t)IVL_PHASE_LEVEL_OUT;
         }
     }
     return false;
@@ -312,13 +294,22 @@ void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t
 ivl_drive_t ivl_phase_drive(const ivl_state_t *state)
 {
     const bool cut = (state->phase == IVL_PHASE_ABORTED) && state->abort_cut;
-    return cut ? IVL_DRIVE_OFF : ROWS[state->phase].drive;
+    return cut ? IVL_DRIVE_OFF : (ivl_drive_t)ROWS[state->phase].drive;
 }
+
+#ifndef IVL_NO_TEXT
+static const char *const NAMES[] = {
+    [IVL_PHASE_IDLE] = "idle", [IVL_PHASE_READY] = "ready",     [IVL_PHASE_APPROACH] = "approach",
+    [IVL_PHASE_FLIP] = "flip", [IVL_PHASE_COAST] = "coast",     [IVL_PHASE_ATTACHED] = "attached",
+    [IVL_PHASE_DONE] = "done", [IVL_PHASE_ABORTED] = "aborted", [IVL_PHASE_LEVEL_OUT] = "level_out",
+};
+_Static_assert(sizeof NAMES / sizeof NAMES[0] == (size_t)IVL_PHASE_COUNT, "one name a phase");
 
 const char *ivl_phase_name(ivl_phase_t phase)
 {
-    return ((unsigned)phase < (unsigned)IVL_PHASE_COUNT) ? ROWS[phase].name : "?";
+    return ((unsigned)phase < (unsigned)IVL_PHASE_COUNT) ? NAMES[phase] : "?";
 }
+#endif
 
 bool ivl_motors_latched_off(const ivl_state_t *state)
 {

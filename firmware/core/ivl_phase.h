@@ -21,8 +21,10 @@ void ivl_phase_update(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t
 /// What drives the motors in the present phase: the row's entry, but OFF in ABORTED once the vehicle was lost or has landed.
 ivl_drive_t ivl_phase_drive(const ivl_state_t *state);
 
+#ifndef IVL_NO_TEXT
 /// Lower-case name of a phase ("approach"), "?" for a number that is none.  Static storage.
 const char *ivl_phase_name(ivl_phase_t phase);
+#endif
 
 /// True if no motor can run again before a new request cycle (IDLE, then HOVER): in coast, attached, done, and in aborted once the
 /// vehicle was lost or has landed.

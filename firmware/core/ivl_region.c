@@ -6,18 +6,14 @@
 // with no thrust left to accelerate with, the aim is still finite: what cannot be reached is left to the rule approach_time
 static const float ACCEL_MPS2_MIN = 0.1f;
 
-// Newton's method from above on a convex function: four steps leave less than 1 mm/s of any speed that is flown
-static const int STEPS = 4;
-
 static float most(float a, float b)
 {
     return (a > b) ? a : b;
 }
 
-// also of a negative number, which rounding leaves where nothing is left
-static float root(float x)
+static float least(float a, float b)
 {
-    return sqrtf(most(x, 0.0f));
+    return (a < b) ? a : b;
 }
 
 bool ivl_region_knows(const ivl_cfg_t *cfg, const ivl_room_t *room)
@@ -25,14 +21,14 @@ bool ivl_region_knows(const ivl_cfg_t *cfg, const ivl_room_t *room)
     return (room->d_ceil_m > 0.0f) && (room->d_ceil_m <= cfg->d_ceil_m_max);
 }
 
-// each component raised to the region, the one towards the ceiling first, within speed_max
+// each component raised to the region, the one towards the ceiling first, within speed_max                            [MODEL eq. 15.1]
 static ivl_aim_t nominal(const ivl_cfg_t *cfg, ivl_aim_t asked)
 {
+    // what is asked is within speed_max, so no root is of a negative number
     const float square = cfg->speed_mps_max * cfg->speed_mps_max;
-    const float vz_max = most(root(square - asked.vx_mps * asked.vx_mps), asked.vz_mps);
-    const float vz = ivl_clamp(cfg->region_vz_mps, asked.vz_mps, vz_max);
-    const float vx_max = most(root(square - vz * vz), asked.vx_mps);
-    return (ivl_aim_t){.vx_mps = ivl_clamp(cfg->region_vx_mps, asked.vx_mps, vx_max), .vz_mps = vz};
+    const float vz = most(asked.vz_mps, least(cfg->region_vz_mps, sqrtf(square - asked.vx_mps * asked.vx_mps)));
+    const float vx = most(asked.vx_mps, least(cfg->region_vx_mps, sqrtf(square - vz * vz)));
+    return (ivl_aim_t){.vx_mps = vx, .vz_mps = vz};
 }
 
 // part of the rated thrust that the battery gives; the square is a little less than what is measured
@@ -53,53 +49,37 @@ static float accel_mps2(const ivl_cfg_t *cfg, float vbat_V, float dir_z)
     const float full_mps2 = 4.0f * cfg->motor_thrust_N_max * battery_share(cfg, vbat_V) / cfg->mass_kg;
     const float used_mps2 = g + cfg->thrust_use_norm * most(full_mps2 - g, 0.0f);
     const float up_mps2 = g * dir_z;
-    const float a = root(up_mps2 * up_mps2 + used_mps2 * used_mps2 - g * g) - up_mps2;
-    return ivl_clamp(a, ACCEL_MPS2_MIN, most(cfg->approach_accel_mps2, ACCEL_MPS2_MIN));
+    const float a = sqrtf(up_mps2 * up_mps2 + used_mps2 * used_mps2 - g * g) - up_mps2;
+    return ivl_clamp(a, ACCEL_MPS2_MIN, cfg->approach_accel_mps2);
 }
 
-// Largest v_z that is reached before v_z / d is region_rrev: the vehicle rises (v_0 + v_z) |dv| / 2a meanwhile            [MODEL eq. 15.3]
-static float vz_within(const ivl_cfg_t *cfg, float room_m, float v0x_mps, float v0z_mps, const ivl_aim_t *aim)
+// Largest v with v t + v^2 / 2a within the room: the way of a time t, and a ramp from rest or braking                [MODEL eq. 15.3, 15.4]
+static float within(float a_mps2, float t_s, float room_m)
 {
-    const float dx = aim->vx_mps - v0x_mps, per_2a = 0.5f / aim->accel_mps2, delay_s = 1.0f / cfg->region_rrev_per_s;
-    float       vz = aim->vz_mps;
-    for (int i = 0; i < STEPS; i++)
-    {
-        const float dz = vz - v0z_mps, dv = most(sqrtf(dx * dx + dz * dz), 1.0e-6f), sum = v0z_mps + vz;
-        const float over_m = sum * dv * per_2a + vz * delay_s - room_m;
-        const float slope_s = (dv + sum * dz / dv) * per_2a + delay_s;
-        // a room that suffices leaves the aim as it is
-        vz -= most(over_m, 0.0f) / slope_s;
-    }
-    return vz;
+    return a_mps2 * (sqrtf(t_s * t_s + 2.0f * most(room_m, 0.0f) / a_mps2) - t_s);
 }
 
-// Largest v_x with v_x t + v_x^2 / 2a within the room, t = d / v_z: a straight path from rest to the ceiling, then braking    [MODEL eq. 15.4]
-static float vx_within(const ivl_cfg_t *cfg, float room_m, float t_s)
-{
-    const float a = cfg->approach_accel_mps2;
-    return a * (root(t_s * t_s + 2.0f * most(room_m, 0.0f) / a) - t_s);
-}
-
+// the clamps take the slower end for what is no number: where nothing is to be accelerated, or a measured value is bad
 ivl_aim_t ivl_region_aim(const ivl_cfg_t *cfg, const ivl_room_t *room, ivl_vec3_t p_W_m, ivl_vec3_t v_W_mps, ivl_aim_t asked)
 {
     ivl_aim_t   aim = nominal(cfg, asked);
-    const float v0x = ivl_clamp(v_W_mps.x, -cfg->speed_mps_max, cfg->speed_mps_max);
-    const float v0z = ivl_clamp(v_W_mps.z, 0.0f, cfg->speed_mps_max);
-    const float dx = aim.vx_mps - v0x, dz = aim.vz_mps - v0z, dv = sqrtf(dx * dx + dz * dz);
-    aim.accel_mps2 = accel_mps2(cfg, room->vbat_V, (dv > 0.0f) ? dz / dv : 1.0f);
+    const float dx = aim.vx_mps - v_W_mps.x, dz = aim.vz_mps - v_W_mps.z, dv = sqrtf(dx * dx + dz * dz);
+    const float dir_z = (dv > 0.0f) ? dz / dv : 1.0f;
+    aim.accel_mps2 = accel_mps2(cfg, room->vbat_V, dir_z);
 
     // a vehicle that is faster already is not braked: that would take room, too
-    const float up_m = cfg->fence_z_m_max - p_W_m.z;
     const bool  knows = ivl_region_knows(cfg, room);
-    const float room_z_m = (knows && !(up_m < room->d_ceil_m)) ? room->d_ceil_m : up_m;
-    const float vz_min = ivl_clamp(v0z, asked.vz_mps, aim.vz_mps);
-    aim.vz_mps = ivl_clamp(vz_within(cfg, room_z_m, v0x, v0z, &aim), vz_min, aim.vz_mps);
+    const float up_m = cfg->fence_z_m_max - p_W_m.z, d_m = room->d_ceil_m;
+    const float room_z_m = (knows && !(up_m < d_m)) ? d_m : up_m;
+    const float az_mps2 = aim.accel_mps2 * dir_z;
+    const float vz = within(az_mps2, 1.0f / cfg->region_rrev_per_s, room_z_m + 0.5f * v_W_mps.z * v_W_mps.z / az_mps2);
+    aim.vz_mps = ivl_clamp(vz, most(asked.vz_mps, least(v_W_mps.z, aim.vz_mps)), aim.vz_mps);
 
     if (knows && (aim.vz_mps > 0.0f))
     {
         // what the present speed carries the vehicle on while it changes
-        const float on_m = 0.5f * most(v0x, 0.0f) * dv / aim.accel_mps2;
-        const float vx = vx_within(cfg, cfg->fence_x_m_max - p_W_m.x - on_m, room->d_ceil_m / aim.vz_mps);
+        const float on_m = 0.5f * most(v_W_mps.x, 0.0f) * dv / aim.accel_mps2;
+        const float vx = within(cfg->approach_accel_mps2, d_m / aim.vz_mps, cfg->fence_x_m_max - p_W_m.x - on_m);
         aim.vx_mps = ivl_clamp(vx, asked.vx_mps, aim.vx_mps);
     }
     return aim;

@@ -24,6 +24,7 @@ typedef struct
 {
     ivl_vitals_t vitals;      ///< this tick's
     uint8_t      rule;        ///< ivl_rule_t that holds in the present phase, 0 if none
+    uint8_t      act;         ///< ivl_act_t that follows from it
     uint8_t      cause;       ///< ivl_rule_t that last ended a phase of this arm cycle, 0 if none did
     bool         locked_out;  ///< the vehicle may hang or lie anywhere: no other controller gets the motors
     float        rest_s;      ///< how long it has rested upright since
@@ -38,9 +39,10 @@ typedef struct
     bool  cfg_good;  ///< false: ivl_cfg_check refused the configuration, the core stays in IDLE
 } ivl_derived_t;
 
-/// What was decided about this approach, go or no-go.  All zero before.
+/// What was decided about this approach, go or no-go.  All zero before, but for `asked`.
 typedef struct
 {
+    bool  asked;     ///< it is to be decided in this tick
     bool  made;      ///< it was decided
     bool  go;        ///< the flip may start
     float p_land;    ///< probability of a landing that decided it
@@ -50,11 +52,11 @@ typedef struct
 /// What LEVEL_OUT remembers.
 typedef struct
 {
-    bool       rises;      ///< still on the way up
-    float      z_W_m;      ///< height at which to hover in the end
-    float      rest_s;     ///< how long the reference has been at rest there
-    float      speed_mps;  ///< speed of the reference along the ceiling, once the vehicle rises no more
-    ivl_vec3_t dir_W;      ///< its direction, unit length
+    bool  rises;   ///< still on the way up
+    float z_W_m;   ///< height at which to hover in the end
+    float rest_s;  ///< how long the reference has been at rest there
+    float vx_mps;  ///< velocity of the reference along the ceiling, once the vehicle rises no more
+    float vy_mps;
 } ivl_level_t;
 
 typedef struct
@@ -79,14 +81,4 @@ typedef struct
     ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
     ivl_diag_t     diag;
 } ivl_state_t;
-
-/// What is left for an approach, as this tick knows it.
-static inline ivl_room_t ivl_state_room(const ivl_state_t *state, const ivl_seen_t *seen)
-{
-    const ivl_vitals_t *vitals = &state->guard.vitals;
-    return (ivl_room_t){
-        .d_ceil_m = seen->ceiling.valid ? seen->ceiling.d_ceil_m : 0.0f,
-        .vbat_V = (vitals->given != 0u) ? vitals->vbat_V : 0.0f,
-    };
-}
 #endif  // IVL_STATE_H

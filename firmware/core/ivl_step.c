@@ -67,80 +67,87 @@ static void count_faults(ivl_diag_t *diag, const ivl_sense_t *sense)
 // all motors off
 static void rest(const ivl_state_t *state, const ivl_seen_t *seen, ivl_out_t *out)
 {
-    *out = (ivl_out_t){
-        .phase = state->phase,
-        .phase_log = (uint8_t)state->phase,
-        .stock_allowed = (state->phase == IVL_PHASE_IDLE) && !state->guard.locked_out,
-        .ceiling = seen->ceiling,
-        .cues = seen->cues,
-    };
+    memset(out, 0, sizeof *out);
+    out->phase = state->phase;
+    out->phase_log = (uint8_t)state->phase;
+    out->stock_allowed = (state->phase == IVL_PHASE_IDLE) && !state->guard.locked_out;
+    out->ceiling = seen->ceiling;
+    out->cues = seen->cues;
 }
 
-static void track(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_reference_t *ref, float thrust_N[4])
+// the tick in which an approach begins has enough to do
+static void aim(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
 {
-    const ivl_wrench_t wrench = ivl_controller_compute(cfg, &state->sense.sample, ref, state->derived.tan_tilt_cmd_max);
-    ivl_mixer_thrusts(cfg, &wrench, thrust_N);
+    if ((state->approach.wants != (uint8_t)IVL_APPROACH_NOTHING) && (state->n_phase_tick > 1u))
+    {
+        const ivl_vitals_t *vitals = &state->guard.vitals;
+        const ivl_room_t    room = {
+            .d_ceil_m = seen->ceiling.valid ? seen->ceiling.d_ceil_m : 0.0f,
+            .vbat_V = (vitals->given != 0u) ? vitals->vbat_V : 0.0f,
+        };
+        ivl_approach_aim(cfg, &state->approach, &room, state->distance.measured);
+    }
+}
+
+// what the tracking controller is to follow
+static ivl_reference_t reference(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, const ivl_seen_t *seen)
+{
+    if (what == IVL_DRIVE_LAND)
+    {
+        return ivl_landing_next(cfg, state);
+    }
+    if (what == IVL_DRIVE_APPROACH)
+    {
+        aim(cfg, state, seen);
+        return ivl_approach_next(cfg, &state->approach, seen->cues.rrev_per_s, state->derived.dt_s);
+    }
+    if (what == IVL_DRIVE_LEVEL)
+    {
+        return ivl_level_out_next(cfg, state);
+    }
+    return (ivl_reference_t){.p_W_m = state->p_hold_W_m};
 }
 
 static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, const ivl_seen_t *seen, float thrust_N[4])
 {
-    const ivl_room_t room = ivl_state_room(state, seen);
-    ivl_reference_t  ref = {.p_W_m = {0.0f, 0.0f, 0.0f}};
-    switch (what)
+    if (what == IVL_DRIVE_FLIP)
     {
-    case IVL_DRIVE_HOVER:
-        ref.p_W_m = state->p_hold_W_m;
-        track(cfg, state, &ref, thrust_N);
-        break;
-    case IVL_DRIVE_LAND:
-        ref = ivl_landing_next(cfg, state);
-        track(cfg, state, &ref, thrust_N);
-        break;
-    case IVL_DRIVE_APPROACH:
-        ivl_approach_look(cfg, &state->approach, &room);
-        ref = ivl_approach_next(cfg, &state->approach, seen->cues.rrev_per_s, state->derived.dt_s);
-        track(cfg, state, &ref, thrust_N);
-        break;
-    case IVL_DRIVE_LEVEL:
-        ref = ivl_level_out_next(cfg, state);
-        track(cfg, state, &ref, thrust_N);
-        break;
-    case IVL_DRIVE_FLIP:
         ivl_maneuver_thrusts(cfg, state->snapshot.action.moment_Nm, thrust_N);
-        break;
-    case IVL_DRIVE_OFF:
-    default:
-        memset(thrust_N, 0, 4u * sizeof thrust_N[0]);
-        break;
+        return;
     }
+    const ivl_reference_t ref = reference(cfg, state, what, seen);
+    const ivl_wrench_t    wrench = ivl_controller_compute(cfg, &state->sense.sample, &ref, state->derived.tan_tilt_cmd_max);
+    ivl_mixer_thrusts(cfg, &wrench, thrust_N);
+}
+
+// sensed state -> contact, distance -> cues -> phase (the trigger is one of its conditions)
+static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_seen_t *seen)
+{
+    const float dt_s = state->derived.dt_s;
+    state->guard.vitals = in->vitals;
+    ivl_sense_update(cfg, &state->sense, in, dt_s);
+    count_faults(&state->diag, &state->sense);
+    ivl_contact_update(cfg, &state->contact, &state->sense, dt_s);
+    if (!ivl_motors_latched_off(state))
+    {
+        // an approach that ends with this tick's request needs no estimate any more
+        const bool is_approach = (state->phase == IVL_PHASE_APPROACH) && (state->sense.cmd.request == IVL_REQUEST_APPROACH);
+        seen->ceiling = ivl_distance_update(cfg, &state->distance, &state->sense, in, is_approach, dt_s);
+        seen->cues = ivl_cues_compute(seen->ceiling, state->sense.sample.v_WB_mps);
+        ivl_cues_take_flow(cfg, in, &seen->cues);
+    }
+    ivl_phase_update(cfg, state, seen);
 }
 
 void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
 {
     state->diag.n_tick++;
     ivl_seen_t seen = {.cues = {.valid = false}};
-
     // a finished landing only waits for the end of its request cycle
-    if ((state->phase == IVL_PHASE_DONE) && (in->cmd.request != IVL_REQUEST_IDLE))
+    if ((state->phase != IVL_PHASE_DONE) || (in->cmd.request == IVL_REQUEST_IDLE))
     {
-        rest(state, &seen, out);
-        return;
+        decide(cfg, state, in, &seen);
     }
-
-    state->guard.vitals = in->vitals;
-    // sensed state -> contact, distance -> cues -> phase (the trigger is one of its conditions)
-    ivl_sense_update(cfg, &state->sense, in, state->derived.dt_s);
-    count_faults(&state->diag, &state->sense);
-    ivl_contact_update(cfg, &state->contact, &state->sense, state->derived.dt_s);
-    if (!ivl_motors_latched_off(state))
-    {
-        // an approach that ends with this tick's request needs no estimate any more
-        const bool is_approach = (state->phase == IVL_PHASE_APPROACH) && (state->sense.cmd.request == IVL_REQUEST_APPROACH);
-        seen.ceiling = ivl_distance_update(cfg, &state->distance, &state->sense, in, is_approach, state->derived.dt_s);
-        seen.cues = ivl_cues_compute(seen.ceiling, state->sense.sample.v_WB_mps);
-        ivl_cues_take_flow(cfg, in, &seen.cues);
-    }
-    ivl_phase_update(cfg, state, &seen);
 
     // phase -> thrusts -> PWM
     rest(state, &seen, out);

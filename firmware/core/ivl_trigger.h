@@ -22,6 +22,7 @@ typedef struct
     ivl_policy_id_t policy;  ///< which one it was
 } ivl_snapshot_t;
 
-/// The trigger tick as it is to be latched.
-ivl_snapshot_t ivl_trigger_snapshot(const ivl_sample_t *sample, const ivl_seen_t *seen, ivl_policy_id_t policy, ivl_action_t action);
+/// Latch the trigger tick.
+void ivl_trigger_snapshot(ivl_snapshot_t *snapshot, const ivl_sample_t *sample, const ivl_seen_t *seen, const ivl_policy_id_t *policy,
+                          const ivl_action_t *action);
 #endif  // IVL_TRIGGER_H

@@ -28,6 +28,8 @@ SOLVED_SHARE, STUCK_SHARE = 0.8, 0.5
 RECENT_EPISODES = 3
 """The landing rate of a trial while it learns is that of its last three episodes (as in the paper)."""
 
+_P_TOLD_MIN = 0.01
+
 BoolArray = npt.NDArray[np.bool_]
 Outcomes = npt.NDArray[np.void]
 """Record array of the library's outcome table, any shape."""
@@ -75,6 +77,22 @@ def as_dict(outcome: Any, end_reason: str) -> dict[str, Any]:
         result[name] = None if isinstance(value, float) and not np.isfinite(value) else value
     result["end_reason"] = end_reason
     return result
+
+
+def verdict(outcome: Any) -> str:
+    """One outcome record in words: feet and contact; of a no-go its probability, and how near the ceiling came.
+
+    The distance is that of the body's origin, as in `d_min_m`.
+    """
+    touched = bool(outcome["body_contact"] or outcome["base_contact"])
+    contact = ", body contact" if touched else ""
+    if outcome["no_go"]:
+        p = float(outcome["p_land"])
+        told = f"= {p:.2f}" if p >= _P_TOLD_MIN else f"below {_P_TOLD_MIN}"
+        return f"no_go at P {told}, closest {1000 * float(outcome['d_min_m']):.0f} mm to the ceiling{contact}"
+    if not outcome["n_legs"]:
+        return f"no foot stuck{contact}"
+    return f"{int(outcome['n_legs'])} feet stuck{contact or ', clean'}"
 
 
 @cache

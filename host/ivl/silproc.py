@@ -16,7 +16,7 @@ import subprocess
 import tempfile
 import threading
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
@@ -69,6 +69,7 @@ class SilProcess:
         port: int = 0,
         bind: str = "127.0.0.1",
         faults: Mapping[str, float] | None = None,
+        decks: Sequence[str] = (),
     ) -> None:
         """Say what is to be started.
 
@@ -81,6 +82,7 @@ class SilProcess:
             port: UDP port of the first vehicle; 0 takes free ones.
             bind: Address to listen on.
             faults: Faults of the link by name, for example `{"loss": 0.05}`.
+            decks: Names of the decks on board; none given: that with which the program starts, a flow deck.
         """
         self._model = model_text(world)
         self._vehicles, self._port = vehicles, port
@@ -89,6 +91,8 @@ class SilProcess:
         self._arguments += ["--lockstep"] if lockstep else []
         for name, value in (faults or {}).items():
             self._arguments += ["--fault", f"{name}={value!r}"]
+        for deck in decks:
+            self._arguments += ["--deck", deck]
         self._process: subprocess.Popen[str] | None = None
         self._errors: IO[str] | None = None
         self._control: dict[int, tuple[str, int]] = {}

@@ -25,6 +25,7 @@ START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2, "state": 3}
 _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within seconds
 _SEED_MAX = 2**64 - 1
 _THREADS_MAX = 256
+_LEVEL_OUT = "level_out"
 _QUATERNION_SLACK = 4e-4
 _HOVER_S_MAX, _HOVER_M_MAX = 600.0, 100.0
 
@@ -197,6 +198,13 @@ class World:
     def phase_name(self, code: int) -> str:
         """Name of a trace row's `phase`."""
         return self._library.phase_name(int(code))
+
+    def called_off_s(self, trace: "Trace") -> float:
+        """When the policy called a flight off: the first row of its level-out, s; NaN of a flight that went on."""
+        for row_s, phase in zip(trace.rows.t_s, trace.rows.phase, strict=True):
+            if self.phase_name(phase) == _LEVEL_OUT:
+                return float(row_s)
+        return math.nan
 
     def rollouts(
         self,

@@ -11,11 +11,10 @@
 
 ivl_cf_t ivl_cf_the;
 
-static const float    ACC_FILTER_HZ = 30.0f;
-static const float    SIGMA_M_MIN = 1.0e-3f, SIGMA_M_MAX = 100.0f;
-static const uint32_t RANGE_MS = 100;  // period of the distance sensor
-static const double   RANGE_M_MAX = 4.0;
-static const uint16_t RANGE_NONE_MM = 32767;
+static const uint8_t RADIO_ADDRESS = 0xE7;  // last byte
+
+static const float ACC_FILTER_HZ = 30.0f;
+static const float SIGMA_M_MIN = 1.0e-3f, SIGMA_M_MAX = 100.0f;
 
 // ---- start
 
@@ -34,19 +33,33 @@ static bool fits(const ivl_sim_model_t *model, uint32_t *tick_ms)
     return false;
 }
 
+/// As after power-on.  What belongs to the simulation and not to the vehicle, its decks included, stays as it was.
 static void boot_settings(ivl_cf_t *cf)
 {
+    const ivl_cf_settings_t before = cf->set;
     cf->set = (ivl_cf_settings_t){
         .controller = IVL_CF_CONTROLLER_APP,
         .estimator = IVL_CF_ESTIMATOR_KALMAN,
-        .start = IVL_CF_START_AS_FLOWN,
-        .d_ceil_m = 0.5,
-        .start_z_m = (float)(0.5 * cf->model.raw.world_ceiling_height_m),
         .stab_roll = 1,
         .stab_pitch = 1,
+        .yaw_mode = 2,
+        .takeoff_mps = 0.5f,
+        .landing_mps = 0.5f,
+        .cppm = {.roll_degps = 720.0f, .pitch_degps = 720.0f, .yaw_degps = 400.0f, .roll_deg = 50.0f, .pitch_deg = 50.0f},
         .ext_pos_sigma_m = 0.01f,
-        .ext_quat_sigma_rad = 4.5e-3f,
-        .deck = 1,
+        .low_V = 3.2f,
+        .sim = before.sim,
+        .has_flow_deck = before.has_flow_deck,
+        .has_ranger_deck = before.has_ranger_deck,
+        .cpu_id = {before.cpu_id[0], before.cpu_id[1], before.cpu_id[2]},
+    };
+}
+
+static void open_settings(ivl_cf_t *cf)
+{
+    cf->set = (ivl_cf_settings_t){
+        .sim = {.start = IVL_CF_START_AS_FLOWN, .d_ceil_m = 0.5, .start_z_m = (float)(0.5 * cf->model.raw.world_ceiling_height_m)},
+        .cpu_id = {0x00515649u, (uint32_t)(cf->seed >> 32), (uint32_t)cf->seed},
     };
 }
 
@@ -59,6 +72,32 @@ static void boot_app(ivl_cf_t *cf)
     controllerOutOfTreeInit();
     cf->set.selftest_passed = controllerOutOfTreeTest() ? 1 : 0;
     app_task_start();
+}
+
+/// Power-on, wherever it is.
+static void boot(ivl_cf_t *cf)
+{
+    const uint8_t auto_arm = cf->supervisor.auto_arm;
+    boot_settings(cf);
+    ivl_cf_supervisor_init(&cf->supervisor);
+    cf->supervisor.auto_arm = auto_arm;
+    ivl_cf_commander_init(&cf->commander);
+    cf->commander.setpoint.t_ms = ivl_cf_now_ms(cf);
+    ivl_cf_planner_init(&cf->planner);
+    ivl_cf_estimate_reset(&cf->estimate);
+    cf->frame = (ivl_cf_frame_t){.is_other = false};
+    ivl_cf_stock_reset(&cf->stock);
+    ivl_cf_decks_boot(cf);
+    cf->runs_stock = false;
+    cf->told = (ivl_sim_told_t){.t_pose_us = 0};
+    cf->state = (state_t){.attitudeQuaternion = {.w = 1.0f}};
+    cf->to_app = (ivl_cf_packets_t){.most = IVL_CF_PACKETS_IN_MAX};
+    cf->from_app = (ivl_cf_packets_t){.most = IVL_CF_PACKETS_MAX};
+    cf->tester_errors = 0;
+    cf->app_wake_ms = 0;
+    cf->is_on = true;
+    ivl_cf_tables_boot(cf);
+    boot_app(cf);
 }
 
 ivl_cf_t *ivl_cf_open(const ivl_sim_model_t *model, uint64_t seed, char *error, size_t error_size)
@@ -81,24 +120,18 @@ ivl_cf_t *ivl_cf_open(const ivl_sim_model_t *model, uint64_t seed, char *error, 
     cf->model.core = ivl_cf_core;
     cf->tick_ms = tick_ms;
     cf->seed = seed;
-    cf->to_app.most = IVL_CF_PACKETS_IN_MAX;
-    cf->from_app.most = IVL_CF_PACKETS_MAX;
     cf->acc_share = (float)(1.0 - ivl_sim_exp(-2.0 * IVL_SIM_PI * (double)ACC_FILTER_HZ * model->tick_s));
     cf->has_range = model->raw.range_rate_hz > 0.0;
-    cf->range_up_mm = RANGE_NONE_MM;
-    cf->state.attitudeQuaternion.w = 1.0f;
-    boot_settings(cf);
+    open_settings(cf);
     ivl_cf_supervisor_init(&cf->supervisor);
-    ivl_cf_commander_init(&cf->commander);
-    ivl_cf_planner_init(&cf->planner);
-    ivl_cf_estimate_reset(&cf->estimate);
+    ivl_cf_eeprom_init(cf, RADIO_ADDRESS);
     ivl_cf_power_full(&cf->power);
     if (!ivl_cf_tables_open(cf))
     {
         (void)snprintf(error, error_size, "vehicle: the app has more parameters or log variables than the tables hold");
         return NULL;
     }
-    boot_app(cf);
+    boot(cf);
     ivl_sim_group_init(&cf->model, &cf->group);
     cf->group.port = cf->model.core.open(cf->model.core.context);
     ivl_cf_world_boot(cf);
@@ -137,20 +170,11 @@ static void supervise(ivl_cf_t *cf)
         {
             ivl_cf_print("SUP: %s, %s required\n", ivl_cf_supervisor_name(state), (state == IVL_CF_STATE_LOCKED) ? "reboot" : "recovery");
         }
-    }
-}
-
-/// Upwards along the body's axis, to the ceiling.
-static void look_up(ivl_cf_t *cf)
-{
-    const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
-    const double        up_z = ivl_rot_from_quat(kin.q_WB).row[2].z;
-    const double        room_m = cf->model.raw.world_ceiling_height_m - kin.p_WB_m[2];
-    const bool          seen = up_z > 0.5 && room_m >= 0.0 && room_m <= RANGE_M_MAX * up_z;
-    cf->range_up_mm = RANGE_NONE_MM;
-    if (seen)
-    {
-        cf->range_up_mm = (uint16_t)(room_m / up_z * 1000.0 + 0.5);
+        if (!ivl_cf_supervisor_can_fly(&cf->supervisor) && !ivl_cf_planner_rests(&cf->planner))
+        {
+            // what was planned is forgotten, or it would go on when the motors may run again
+            ivl_cf_planner_stop(&cf->planner);
+        }
     }
 }
 
@@ -161,7 +185,7 @@ static void judge_estimate(ivl_cf_t *cf)
     const float fresh_s = 0.1f, drift_mps = 0.5f;
     const float age_s = (float)(ivl_cf_time_us(cf) - cf->sensed.t_pose_us) * APP_S_PER_US;
     const float drift_m = (age_s > fresh_s) ? drift_mps * age_s : 0.0f;
-    const float sigma_m = (cf->set.pose_source != 0u) ? cf->set.ext_pos_sigma_m + drift_m : SIGMA_M_MIN;
+    const float sigma_m = (cf->set.sim.pose_source != 0u) ? cf->set.ext_pos_sigma_m + drift_m : SIGMA_M_MIN;
     const float told_m = ivl_clamp(sigma_m, SIGMA_M_MIN, SIGMA_M_MAX);
     cf->variance_m2 = told_m * told_m;
 }
@@ -170,12 +194,12 @@ static void draw_power(ivl_cf_t *cf)
 {
     const float weight_N = cf->model.firmware.mass_kg * cf->model.firmware.gravity_mps2;
     const float thrust_N = cf->motor_N[0] + cf->motor_N[1] + cf->motor_N[2] + cf->motor_N[3];
-    ivl_cf_power_step(&cf->power, thrust_N / weight_N, cf->set.vbat_V, IVL_CF_PLANNER_MS);
+    ivl_cf_power_step(&cf->power, thrust_N / weight_N, cf->set.sim.vbat_V, cf->set.low_V, IVL_CF_PLANNER_MS);
 }
 
-void ivl_cf_step(ivl_cf_t *cf)
+/// All that runs beside the stabilizer.
+static void run_tasks(ivl_cf_t *cf)
 {
-    cf->t_ms++;
     run_app(cf);
     if (cf->t_ms % IVL_CF_PLANNER_MS == 0)
     {
@@ -187,9 +211,15 @@ void ivl_cf_step(ivl_cf_t *cf)
     {
         supervise(cf);
     }
-    if (!cf->has_range && cf->t_ms % RANGE_MS == 0)
+    ivl_cf_decks_step(cf);
+}
+
+void ivl_cf_step(ivl_cf_t *cf)
+{
+    cf->t_ms++;
+    if (cf->is_on)
     {
-        look_up(cf);
+        run_tasks(cf);
     }
     if (cf->t_ms % cf->tick_ms == 0)
     {
@@ -201,6 +231,29 @@ void ivl_cf_step(ivl_cf_t *cf)
     }
 }
 
+// ---- power
+
+void ivl_cf_power_off(ivl_cf_t *cf)
+{
+    cf->is_on = false;
+    cf->text = (ivl_cf_text_t){.n = 0};  // what it had to say
+    cf->n_changed = 0;
+}
+
+void ivl_cf_power_on(ivl_cf_t *cf)
+{
+    if (!cf->is_on)
+    {
+        cf->episode.running = false;
+        boot(cf);
+    }
+}
+
+void ivl_cf_set_address(ivl_cf_t *cf, uint8_t address)
+{
+    ivl_cf_eeprom_init(cf, address);
+}
+
 uint64_t ivl_cf_time_us(const ivl_cf_t *cf)
 {
     return cf->t_ms * 1000u;
@@ -208,6 +261,11 @@ uint64_t ivl_cf_time_us(const ivl_cf_t *cf)
 
 void ivl_cf_link(ivl_cf_t *cf, bool up)
 {
+    const bool turns = cf->model.raw.aero_yaw_torque_norm > 0.0;
+    if (up && !cf->link_up && !turns)
+    {
+        ivl_cf_print("SIL: this vehicle cannot turn (aero.yaw_torque is 0): yaw commands change nothing\n");
+    }
     cf->link_up = up;
 }
 
@@ -228,64 +286,20 @@ size_t ivl_cf_app_take(ivl_cf_t *cf, uint8_t bytes[IVL_CF_APP_BYTES])
     return ivl_cf_packets_take(&cf->from_app, bytes, IVL_CF_APP_BYTES);
 }
 
-// ---- memories
-
-static uint32_t outcome_size(void)
-{
-    return (uint32_t)(sizeof(ivl_cf_outcome_header_t) + sizeof(ivl_sim_outcome_t));
-}
-
-static bool outcome_read(uint32_t address, uint32_t size, uint8_t *bytes)
-{
-    const ivl_cf_episode_t *e = &ivl_cf_the.episode;
-    ivl_cf_outcome_header_t header = e->header;
-    header.magic = IVL_CF_OUTCOME_MAGIC;
-    header.size = (uint32_t)sizeof e->outcome;
-    uint8_t all[sizeof header + sizeof e->outcome];
-    memcpy(all, &header, sizeof header);
-    memcpy(all + sizeof header, &e->outcome, sizeof e->outcome);
-    if (address > sizeof all || size > sizeof all - address)
-    {
-        return false;
-    }
-    memcpy(bytes, all + address, size);
-    return true;
-}
-
-static uint32_t world_size(void)
-{
-    return (uint32_t)sizeof ivl_cf_the.model.raw;
-}
-
-static bool world_read(uint32_t address, uint32_t size, uint8_t *bytes)
-{
-    const ivl_sim_params_t *raw = &ivl_cf_the.model.raw;
-    if (address > sizeof *raw || size > sizeof *raw - address)
-    {
-        return false;
-    }
-    memcpy(bytes, (const uint8_t *)raw + address, size);
-    return true;
-}
-
-const ivl_cf_memory_t *ivl_cf_memories(const ivl_cf_t *cf, size_t *n)
-{
-    (void)cf;
-    static ivl_cf_memory_t memories[3];
-    memories[0] = *ivl_cf_app_memory();
-    memories[1] = (ivl_cf_memory_t){.type = IVL_CF_MEMORY_OUTCOME, .size = outcome_size, .read = outcome_read};
-    memories[2] = (ivl_cf_memory_t){.type = IVL_CF_MEMORY_WORLD, .size = world_size, .read = world_read};
-    *n = sizeof memories / sizeof memories[0];
-    return memories;
-}
-
 // ---- supervisor
+
+bool ivl_cf_flies_high_level(const ivl_cf_t *cf)
+{
+    return ivl_cf_supervisor_can_fly(&cf->supervisor) && !ivl_cf_planner_rests(&cf->planner) &&
+           cf->commander.priority <= IVL_CF_PRIORITY_HIGH_LEVEL;
+}
 
 uint16_t ivl_cf_supervisor_info(const ivl_cf_t *cf)
 {
-    const uint32_t active = (cf->planner.plan != IVL_CF_PLAN_STOPPED) ? 1u << 8 : 0u;
+    const uint32_t active = ivl_cf_planner_rests(&cf->planner) ? 0u : 1u << 8;
     const uint32_t finished = ivl_cf_planner_finished(&cf->planner, ivl_cf_now_ms(cf)) ? 1u << 9 : 0u;
-    return (uint16_t)(ivl_cf_supervisor_bits(&cf->supervisor) | active | finished);
+    const uint32_t disabled = (cf->planner.plan == IVL_CF_PLAN_DISABLED) ? 1u << 10 : 0u;
+    return (uint16_t)(ivl_cf_supervisor_bits(&cf->supervisor) | active | finished | disabled);
 }
 
 bool ivl_cf_arm(ivl_cf_t *cf, bool arm)

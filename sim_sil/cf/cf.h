@@ -8,6 +8,7 @@
 /// One vehicle a process, since the app has static memory.  Not re-entrant.  SI units, radians, world z up, unless a line says otherwise.
 #ifndef IVL_CF_H
 #define IVL_CF_H
+#include "cf_planner.h"
 #include "sim_model.h"
 #include "world_rollout.h"
 
@@ -28,6 +29,22 @@ void ivl_cf_step(ivl_cf_t *cf);
 
 /// Time since boot, us: 1000 times the number of steps.  Goes on through resets.
 uint64_t ivl_cf_time_us(const ivl_cf_t *cf);
+
+/// The processor loses its power: motors off, nothing is done or said, and the vehicle falls.
+void ivl_cf_power_off(ivl_cf_t *cf);
+
+/// It gets it again: it boots where it is.  Time goes on; parameters have their first values, but for the group sil and the decks.
+void ivl_cf_power_on(ivl_cf_t *cf);
+
+/// Last byte of the radio address, which the EEPROM shows; before the vehicle is used.
+void ivl_cf_set_address(ivl_cf_t *cf, uint8_t address);
+
+/// Put a deck on, by the name of its parameter without the group: bcFlow2 or bcMultiranger; before tables and memories are asked for.
+/// @return false if there is no such deck
+bool ivl_cf_attach(ivl_cf_t *cf, const char *name);
+
+/// Whether a deck of this name can be put on.
+bool ivl_cf_is_deck(const char *name);
 
 /// Whether somebody listens; the server's own judgement (no packet for a second: false).
 void ivl_cf_link(ivl_cf_t *cf, bool up);
@@ -69,6 +86,7 @@ typedef struct
     bool        read_only;
     bool        persistent;
     bool        core;
+    bool        held;  ///< there because every Crazyflie has it; without effect
     void       *address;
     void (*changed)(void);
 } ivl_cf_param_t;
@@ -78,6 +96,8 @@ typedef struct
     const char *group, *name;
     uint8_t     type;  ///< ivl_cf_log_type_t
     const void *address;
+    bool        core;
+    bool        held;  ///< constant
 } ivl_cf_log_t;
 
 /// Tables of the vehicle; they do not change after ivl_cf_open.  The server may serve more of its own beside them.
@@ -98,6 +118,7 @@ typedef struct
     uint32_t (*size)(void);                                                ///< bytes
     bool (*read)(uint32_t address, uint32_t size, uint8_t *bytes);         ///< false: not that range, or not now
     bool (*write)(uint32_t address, uint32_t size, const uint8_t *bytes);  ///< NULL: read-only
+    uint8_t serial[8];                                                     ///< number of a 1-wire memory, else 0
 } ivl_cf_memory_t;
 
 const ivl_cf_memory_t *ivl_cf_memories(const ivl_cf_t *cf, size_t *n);
@@ -134,6 +155,9 @@ size_t ivl_cf_app_take(ivl_cf_t *cf, uint8_t bytes[IVL_CF_APP_BYTES]);
 
 // ---- supervisor
 
+/// Flies a way of the high-level commander, and no set-point of a client has come since.
+bool ivl_cf_flies_high_level(const ivl_cf_t *cf);
+
 /// The bit field of packet 9/0.
 uint16_t ivl_cf_supervisor_info(const ivl_cf_t *cf);
 
@@ -151,13 +175,19 @@ bool ivl_cf_is_armed(const ivl_cf_t *cf);
 // ---- commander: one call a set-point.  Angles here are degrees and thrust is 0..65535, as the packets have them.
 // A value that is no number, or beyond what a vehicle can do, makes the call return false, and nothing changes.
 
-bool ivl_cf_set_rpyt(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawrate_degps, uint16_t thrust);  ///< pitch as sent
+/// The sticks of port 3, with all numbers as sent.  The flightmode.* parameters say what they mean: angles or rates, a point, or speeds.
+bool ivl_cf_set_rpyt(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yaw_deg, uint16_t thrust);
 bool ivl_cf_set_stop(ivl_cf_t *cf);
 bool ivl_cf_set_velocity(ivl_cf_t *cf, const float v_W_mps[3], float yawrate_degps);
 bool ivl_cf_set_zdistance(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawrate_degps, float z_m);
 bool ivl_cf_set_hover(ivl_cf_t *cf, float vx_B_mps, float vy_B_mps, float yawrate_degps, float z_m);
 bool ivl_cf_set_position(ivl_cf_t *cf, const float p_W_m[3], float yaw_deg);
+bool ivl_cf_set_althold(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawrate_degps, float vz_mps);
 bool ivl_cf_set_manual(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawrate_degps, uint16_t thrust, bool rate);
+
+/// Pulses of a radio control for roll, pitch, yaw and thrust, 1000 .. 2000 us.
+/// @param[in] level  roll and pitch are angles, else rates
+bool ivl_cf_set_cppm(ivl_cf_t *cf, const uint16_t pulse_us[4], bool level);
 
 /// @param[in] q_WB  x, y, z, w; only its heading is followed
 bool ivl_cf_set_full_state(ivl_cf_t *cf, const float p_W_m[3], const float v_W_mps[3], const float a_W_mps2[3], const float q_WB[4],
@@ -166,13 +196,34 @@ bool ivl_cf_set_full_state(ivl_cf_t *cf, const float p_W_m[3], const float v_W_m
 /// Hand back to the high-level commander, at once: as in the stock firmware, remain_ms changes nothing.
 void ivl_cf_notify_stop(ivl_cf_t *cf, uint32_t remain_ms);
 
-// ---- high-level commander.  @return 0, or an errno: EBUSY 16 when the vehicle cannot fly, EINVAL 22 for values that make no sense, EPERM 1
-// for a take-off in flight and a landing on the floor
+// ---- high-level commander.  @return 0, or an errno, and a line on the console: EBUSY 16 when the vehicle cannot fly, EINVAL 22 for values that
+// make no sense, EPERM 1 for a take-off in flight and a second landing, ENOEXEC 8 for a trajectory that cannot be flown
+
+/// Groups of this vehicle, a bit each.
+void ivl_cf_hl_group(ivl_cf_t *cf, uint8_t mask);
+
+/// Whether a command to these groups, 0 being all, is meant for this vehicle.
+bool ivl_cf_hl_is_meant(const ivl_cf_t *cf, uint8_t mask);
 
 int ivl_cf_hl_takeoff(ivl_cf_t *cf, float height_m, float yaw_rad, bool use_current_yaw, float duration_s);
 int ivl_cf_hl_land(ivl_cf_t *cf, float height_m, float yaw_rad, bool use_current_yaw, float duration_s);
+
+/// With a mean speed instead of a duration.
+/// @param[in] relative   height above, or when landing below, the present one
+/// @param[in] speed_mps  0 or less: hlCommander.vtoff, hlCommander.vland
+int ivl_cf_hl_takeoff_at(ivl_cf_t *cf, float height_m, bool relative, float yaw_rad, bool use_current_yaw, float speed_mps);
+int ivl_cf_hl_land_at(ivl_cf_t *cf, float height_m, bool relative, float yaw_rad, bool use_current_yaw, float speed_mps);
+
+/// @param[in] linear  at a steady speed, else from rest, or from the motion of the way before, to rest
 int ivl_cf_hl_go_to(ivl_cf_t *cf, bool relative, bool linear, const float p_W_m[3], float yaw_rad, float duration_s);
+
+/// More than two half turns, and radii below 0, are brought into range, as on the drone.
+int ivl_cf_hl_spiral(ivl_cf_t *cf, const ivl_cf_spiral_t *spiral);
 int ivl_cf_hl_stop(ivl_cf_t *cf);
+
+/// Which part of the trajectory memory (type 12h) is which trajectory.
+int ivl_cf_hl_define(ivl_cf_t *cf, uint8_t id, const ivl_cf_definition_t *definition);
+int ivl_cf_hl_start(ivl_cf_t *cf, uint8_t id, const ivl_cf_start_t *how);
 
 // ---- localization: used if parameter sil.pose_source is 1, counted always.  @return false for values that are no numbers
 

@@ -1,7 +1,5 @@
 /// @file cf_command.c
-/// What an operator sends to the commander and the high-level commander, as set-points and ways.
-#include <errno.h>
-
+/// What an operator sends to the commander, as set-points.
 #include "cf_vehicle.h"
 #include "ivl_math.h"
 
@@ -14,12 +12,22 @@ static const uint16_t THRUST_MAX_RPYT = 60000;
 
 // what a set-point may ask for, far beyond what the vehicle can do
 static const float DEG_MAX = 3600.0f;
+static const float CPPM_DEG_MAX = 1.0e6f;  // ends of the sticks are parameters
 static const float METRES_MAX = 1000.0f;
-static const float DURATION_S_MAX = 3600.0f;
 
 // with the position held, the sticks ask for a speed: 30 degrees are 1 m/s
 static const float HOLD_MPS_PER_DEG = 1.0f / 30.0f;
 static const float STICK_MIDDLE = 32767.0f;
+static const float SQRT_HALF = 0.70710678f;
+static const float M_PER_MM = 1.0e-3f;
+
+enum
+{
+    YAW_MODE_PLUS = 1  // flightmode.yawMode: motor 1 is in front
+};
+
+// channels of a radio control: pulses in us, and what the ends of roll, pitch and yaw mean
+static const float PULSE_MIDDLE = 1500.0f, PULSE_LOW = 1000.0f, PULSE_HALF = 500.0f, PULSE_FULL = 1000.0f;
 
 static bool within(const float *values, int n, float limit)
 {
@@ -44,7 +52,7 @@ ivl_cf_setpoint_t ivl_cf_setpoint(const ivl_cf_t *cf)
     if (cf->supervisor.state == IVL_CF_STATE_LEVEL_OUT)
     {
         sp.xy = IVL_CF_MODE_OFF;
-        sp.tilt = IVL_CF_MODE_ABS;
+        sp.roll_mode = sp.pitch_mode = IVL_CF_MODE_ABS;
         sp.yaw = IVL_CF_MODE_VELOCITY;
         sp.roll = sp.pitch = sp.yawrate_radps = 0.0f;
     }
@@ -73,7 +81,7 @@ static void tell_planner(ivl_cf_t *cf)
 
 void ivl_cf_relax(ivl_cf_t *cf)
 {
-    if (cf->planner.plan == IVL_CF_PLAN_STOPPED)
+    if (ivl_cf_planner_rests(&cf->planner))
     {
         tell_planner(cf);
     }
@@ -88,10 +96,15 @@ void ivl_cf_notify_stop(ivl_cf_t *cf, uint32_t remain_ms)
 
 void ivl_cf_plan(ivl_cf_t *cf)
 {
-    const ivl_cf_setpoint_t sp = ivl_cf_planner_next(&cf->planner, ivl_cf_now_ms(cf));
-    if (cf->planner.plan == IVL_CF_PLAN_STOPPED)
+    ivl_cf_setpoint_t sp;
+    const bool        has_setpoint = ivl_cf_planner_next(&cf->planner, ivl_cf_now_ms(cf), &sp);
+    if (ivl_cf_planner_rests(&cf->planner))
     {
         tell_planner(cf);
+    }
+    if (!has_setpoint)
+    {
+        return;
     }
     (void)ivl_cf_commander_set(&cf->commander, &sp, IVL_CF_PRIORITY_HIGH_LEVEL, ivl_cf_now_ms(cf));
 }
@@ -102,7 +115,8 @@ void ivl_cf_plan(ivl_cf_t *cf)
 static ivl_cf_setpoint_t attitude(float roll_deg, float pitch_deg, float yawrate_degps, float thrust)
 {
     return (ivl_cf_setpoint_t){
-        .tilt = IVL_CF_MODE_ABS,
+        .roll_mode = IVL_CF_MODE_ABS,
+        .pitch_mode = IVL_CF_MODE_ABS,
         .yaw = IVL_CF_MODE_VELOCITY,
         .roll = roll_deg * RAD_PER_DEG,
         .pitch = -pitch_deg * RAD_PER_DEG,
@@ -128,32 +142,74 @@ static float unlocked_thrust(ivl_cf_t *cf, uint16_t thrust)
     return (float)((thrust < THRUST_MAX_RPYT) ? thrust : THRUST_MAX_RPYT);
 }
 
-bool ivl_cf_set_rpyt(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawrate_degps, uint16_t thrust)
+/// Roll and pitch as sticks: an angle or a rate each, as flightmode.stabMode* says.
+static void set_tilt(const ivl_cf_settings_t *mode, ivl_cf_setpoint_t *sp)
 {
-    const float              angles[] = {roll_deg, pitch_deg, yawrate_degps};
+    sp->roll_mode = (mode->stab_roll != 0u) ? IVL_CF_MODE_ABS : IVL_CF_MODE_VELOCITY;
+    sp->pitch_mode = (mode->stab_pitch != 0u) ? IVL_CF_MODE_ABS : IVL_CF_MODE_VELOCITY;
+}
+
+/// The legacy rate turns the other way than all others; with motor 1 in front, roll and pitch angles turn by an eighth.
+static void set_yaw(const ivl_cf_settings_t *mode, ivl_cf_setpoint_t *sp, float yaw_deg)
+{
+    if (mode->stab_yaw != 0u)
+    {
+        sp->yaw = IVL_CF_MODE_ABS;
+        sp->yaw_rad = yaw_deg * RAD_PER_DEG;
+        return;
+    }
+    sp->yawrate_radps = -yaw_deg * RAD_PER_DEG;
+    if (mode->yaw_mode == YAW_MODE_PLUS)
+    {
+        const float roll = (sp->roll_mode == IVL_CF_MODE_ABS) ? sp->roll : 0.0f;
+        const float pitch = (sp->pitch_mode == IVL_CF_MODE_ABS) ? sp->pitch : 0.0f;
+        sp->roll = (sp->roll_mode == IVL_CF_MODE_ABS) ? SQRT_HALF * (roll + pitch) : sp->roll;
+        sp->pitch = (sp->pitch_mode == IVL_CF_MODE_ABS) ? SQRT_HALF * (pitch - roll) : sp->pitch;
+    }
+}
+
+/// A point in the world instead of sticks: metres, and thrust in mm.
+static ivl_cf_setpoint_t point_of_sticks(float roll, float pitch, float yaw_deg, uint16_t thrust)
+{
+    return (ivl_cf_setpoint_t){
+        .xy = IVL_CF_MODE_ABS,
+        .z = IVL_CF_MODE_ABS,
+        .yaw = IVL_CF_MODE_ABS,
+        .p_W_m = {-pitch, roll, (float)thrust * M_PER_MM},
+        .yaw_rad = yaw_deg * RAD_PER_DEG,
+    };
+}
+
+bool ivl_cf_set_rpyt(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yaw_deg, uint16_t thrust)
+{
+    const float              angles[] = {roll_deg, pitch_deg, yaw_deg};
     const ivl_cf_settings_t *mode = &cf->set;
     if (!within(angles, 3, DEG_MAX))
     {
         return false;
     }
-    ivl_cf_setpoint_t sp = attitude(roll_deg, pitch_deg, yawrate_degps, unlocked_thrust(cf, thrust));
-    sp.tilt = (mode->stab_roll != 0u && mode->stab_pitch != 0u) ? IVL_CF_MODE_ABS : IVL_CF_MODE_VELOCITY;
-    if (mode->stab_yaw != 0u)
-    {
-        sp.yaw = IVL_CF_MODE_ABS;
-        sp.yaw_rad = yawrate_degps * RAD_PER_DEG;
-    }
+    ivl_cf_setpoint_t sp = attitude(roll_deg, pitch_deg, 0.0f, unlocked_thrust(cf, thrust));
+    set_tilt(mode, &sp);
     if (mode->alt_hold != 0u)
     {
+        sp.thrust_norm = 0.0f;
         sp.z = IVL_CF_MODE_VELOCITY;
         sp.v_mps.z = ((float)thrust - STICK_MIDDLE) / STICK_MIDDLE;
     }
     if (mode->pos_hold != 0u)
     {
         sp.xy = IVL_CF_MODE_VELOCITY;
-        sp.in_body = true;
-        sp.v_mps.x = -pitch_deg * HOLD_MPS_PER_DEG;
-        sp.v_mps.y = -roll_deg * HOLD_MPS_PER_DEG;
+        sp.v_mps.x = pitch_deg * HOLD_MPS_PER_DEG;
+        sp.v_mps.y = roll_deg * HOLD_MPS_PER_DEG;
+        sp.roll = sp.pitch = 0.0f;
+    }
+    else if (mode->pos_set != 0u && thrust != 0u)
+    {
+        sp = point_of_sticks(roll_deg, pitch_deg, yaw_deg, thrust);
+    }
+    if (mode->pos_set == 0u)
+    {
+        set_yaw(mode, &sp, yaw_deg);
     }
     return set(cf, &sp);
 }
@@ -162,7 +218,7 @@ bool ivl_cf_set_manual(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawr
 {
     const float       angles[] = {roll_deg, pitch_deg, yawrate_degps};
     ivl_cf_setpoint_t sp = attitude(roll_deg, pitch_deg, yawrate_degps, (float)thrust);
-    sp.tilt = rate ? IVL_CF_MODE_VELOCITY : IVL_CF_MODE_ABS;
+    sp.roll_mode = sp.pitch_mode = rate ? IVL_CF_MODE_VELOCITY : IVL_CF_MODE_ABS;
     return within(angles, 3, DEG_MAX) && set(cf, &sp);
 }
 
@@ -173,6 +229,37 @@ bool ivl_cf_set_zdistance(ivl_cf_t *cf, float roll_deg, float pitch_deg, float y
     sp.z = IVL_CF_MODE_ABS;
     sp.p_W_m.z = z_m;
     return within(angles, 3, DEG_MAX) && ivl_within(z_m, METRES_MAX) && set(cf, &sp);
+}
+
+bool ivl_cf_set_althold(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawrate_degps, float vz_mps)
+{
+    const float       angles[] = {roll_deg, pitch_deg, yawrate_degps};
+    ivl_cf_setpoint_t sp = attitude(roll_deg, pitch_deg, yawrate_degps, 0.0f);
+    sp.z = IVL_CF_MODE_VELOCITY;
+    sp.v_mps.z = vz_mps;
+    return within(angles, 3, DEG_MAX) && ivl_within(vz_mps, METRES_MAX) && set(cf, &sp);
+}
+
+static float stick(uint16_t pulse_us)
+{
+    return -((float)pulse_us - PULSE_MIDDLE) / PULSE_HALF;
+}
+
+bool ivl_cf_set_cppm(ivl_cf_t *cf, const uint16_t pulse_us[4], bool level)
+{
+    const ivl_cf_cppm_t *scale = &cf->set.cppm;
+    const float          roll_deg = stick(pulse_us[0]) * (level ? scale->roll_deg : scale->roll_degps);
+    const float          pitch_deg = stick(pulse_us[1]) * (level ? scale->pitch_deg : scale->pitch_degps);
+    const float          yawrate_degps = stick(pulse_us[2]) * scale->yaw_degps;
+    const float          share = ivl_clamp(((float)pulse_us[3] - PULSE_LOW) / PULSE_FULL, 0.0f, 1.0f);
+    const float          angles[] = {roll_deg, pitch_deg, yawrate_degps};
+    if (!within(angles, 3, CPPM_DEG_MAX))
+    {
+        return false;
+    }
+    ivl_cf_setpoint_t sp = attitude(roll_deg, pitch_deg, yawrate_degps, share * THRUST_FULL);
+    sp.roll_mode = sp.pitch_mode = level ? IVL_CF_MODE_ABS : IVL_CF_MODE_VELOCITY;
+    return set(cf, &sp);
 }
 
 // ---- position and velocity
@@ -227,63 +314,4 @@ bool ivl_cf_set_full_state(ivl_cf_t *cf, const float p_W_m[3], const float v_W_m
                                   .a_W_mps2 = vec(a_W_mps2),
                                   .yaw_rad = ivl_cf_yaw_of(q)};
     return good && set(cf, &sp);
-}
-
-// ---- high-level commander
-
-/// @param[in] allowed  the planner is in a state for it
-static int begin(ivl_cf_t *cf, bool allowed, ivl_cf_plan_t plan, ivl_vec3_t p_W_m, float yaw_rad, float duration_s)
-{
-    const bool good =
-        ivl_vec3_within(p_W_m, METRES_MAX) && ivl_within(yaw_rad, DEG_MAX) && duration_s >= 0.0f && duration_s <= DURATION_S_MAX;
-    if (!good)
-    {
-        return EINVAL;
-    }
-    if (!ivl_cf_supervisor_motors_allowed(&cf->supervisor))
-    {
-        return EBUSY;
-    }
-    if (!allowed)
-    {
-        return EPERM;
-    }
-    ivl_cf_planner_go(&cf->planner, plan, p_W_m, yaw_rad, duration_s, ivl_cf_now_ms(cf));
-    return 0;
-}
-
-static ivl_vec3_t above(const ivl_cf_t *cf, float height_m)
-{
-    const ivl_vec3_t p = cf->planner.last.p_W_m;
-    return ivl_vec3(p.x, p.y, height_m);
-}
-
-int ivl_cf_hl_takeoff(ivl_cf_t *cf, float height_m, float yaw_rad, bool use_current_yaw, float duration_s)
-{
-    const bool  rests = cf->planner.plan == IVL_CF_PLAN_STOPPED;
-    const float yaw = use_current_yaw ? cf->planner.last.yaw_rad : yaw_rad;
-    return begin(cf, rests, IVL_CF_PLAN_FLYING, above(cf, height_m), yaw, duration_s);
-}
-
-int ivl_cf_hl_land(ivl_cf_t *cf, float height_m, float yaw_rad, bool use_current_yaw, float duration_s)
-{
-    // stopped in the air by a streamed set-point that has been given up since: it lands from where the vehicle is
-    const bool  rests = cf->planner.plan == IVL_CF_PLAN_STOPPED && !ivl_cf_supervisor_is_flying(&cf->supervisor);
-    const bool  allowed = cf->planner.plan != IVL_CF_PLAN_LANDING && !rests;
-    const float yaw = use_current_yaw ? cf->planner.last.yaw_rad : yaw_rad;
-    return begin(cf, allowed, IVL_CF_PLAN_LANDING, above(cf, height_m), yaw, duration_s);
-}
-
-int ivl_cf_hl_go_to(ivl_cf_t *cf, bool relative, bool linear, const float p_W_m[3], float yaw_rad, float duration_s)
-{
-    (void)linear;
-    const ivl_cf_goal_t *last = &cf->planner.last;
-    const ivl_vec3_t     p = relative ? ivl_add(last->p_W_m, vec(p_W_m)) : vec(p_W_m);
-    return begin(cf, true, IVL_CF_PLAN_FLYING, p, relative ? last->yaw_rad + yaw_rad : yaw_rad, duration_s);
-}
-
-int ivl_cf_hl_stop(ivl_cf_t *cf)
-{
-    ivl_cf_planner_stop(&cf->planner);
-    return 0;
 }

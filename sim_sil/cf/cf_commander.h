@@ -22,12 +22,12 @@ typedef enum
 /// All zero: no thrust.  SI, radians, x forward, y left, z up; positive pitch is nose down.
 typedef struct
 {
-    uint32_t      t_ms;     ///< when it was set
-    ivl_cf_mode_t xy;       ///< OFF: roll and pitch instead
-    ivl_cf_mode_t z;        ///< OFF: thrust instead
-    ivl_cf_mode_t tilt;     ///< of roll and pitch: ABS angles, VELOCITY rates
-    ivl_cf_mode_t yaw;      ///< ABS or VELOCITY
-    bool          in_body;  ///< horizontal velocity is in heading axes
+    uint32_t      t_ms;                   ///< when it was set
+    ivl_cf_mode_t xy;                     ///< OFF: roll and pitch instead
+    ivl_cf_mode_t z;                      ///< OFF: thrust instead
+    ivl_cf_mode_t roll_mode, pitch_mode;  ///< ABS an angle, VELOCITY a rate
+    ivl_cf_mode_t yaw;                    ///< ABS or VELOCITY
+    bool          in_body;                ///< horizontal velocity is in heading axes
     ivl_vec3_t    p_W_m, v_mps, a_W_mps2;
     float         roll, pitch;  ///< rad, or rad/s
     float         yaw_rad, yawrate_radps;

@@ -14,27 +14,27 @@ static double exact(double parameter, float from_parameter, float commanded)
 
 static uint64_t seed_of(const ivl_cf_settings_t *set)
 {
-    return (uint64_t)set->seed_hi << 32 | set->seed_lo;
+    return (uint64_t)set->sim.seed_hi << 32 | set->sim.seed_lo;
 }
 
 static uint64_t stream_of(const ivl_cf_settings_t *set)
 {
-    return (uint64_t)set->stream_hi << 32 | set->stream_lo;
+    return (uint64_t)set->sim.stream_hi << 32 | set->sim.stream_lo;
 }
 
 static ivl_sim_spec_t spec_of(const ivl_cf_settings_t *set)
 {
     const ivl_command_t *cmd = app_command();
     const ivl_policy_t  *policy = &app_core_state()->policy;
-    const float          angle_rad = (float)(set->angle_deg * (IVL_SIM_PI / 180.0));
+    const float          angle_rad = (float)(set->sim.angle_deg * (IVL_SIM_PI / 180.0));
     ivl_sim_spec_t       spec = {
-        .speed_mps = {exact(set->speed_mps, (float)set->speed_mps, cmd->speed_mps)},
-        .angle_deg = {(angle_rad >= cmd->angle_rad && angle_rad <= cmd->angle_rad) ? set->angle_deg
+        .speed_mps = {exact(set->sim.speed_mps, (float)set->sim.speed_mps, cmd->speed_mps)},
+        .angle_deg = {(angle_rad >= cmd->angle_rad && angle_rad <= cmd->angle_rad) ? set->sim.angle_deg
                                                                                    : (double)cmd->angle_rad * (180.0 / IVL_SIM_PI)},
-        .d_ceil_m = {set->d_ceil_m},
+        .d_ceil_m = {set->sim.d_ceil_m},
         .seed = {seed_of(set)},
         .stream = {stream_of(set)},
-        .start = {set->start},
+        .start = {set->sim.start},
         .form = {policy->id.form},
     };
     for (uint32_t i = 0; i < policy->n; i++)
@@ -76,7 +76,7 @@ void ivl_cf_episode_begin(ivl_cf_t *cf)
     e->draws[0] = seed_of(&cf->set);
     e->draws[1] = stream_of(&cf->set);
     ivl_sim_outcome_clear(&e->now);
-    if (cf->set.start == IVL_CF_START_AS_FLOWN)
+    if (cf->set.sim.start == IVL_CF_START_AS_FLOWN)
     {
         ivl_sim_world_rebase(&cf->group, IVL_CF_LANE);
         cf->zero_us = ivl_cf_time_us(cf);

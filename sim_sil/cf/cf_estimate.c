@@ -54,3 +54,26 @@ void ivl_cf_estimate_fill(ivl_cf_estimate_t *e, float dt_s, ivl_in_t *in)
         in->q_WB = e->attitude.q_WB;
     }
 }
+
+static ivl_vec3_t turned(ivl_vec3_t a, ivl_sincos_t by)
+{
+    return ivl_vec3(by.cos * a.x - by.sin * a.y, by.sin * a.x + by.cos * a.y, a.z);
+}
+
+void ivl_cf_frame_apply(const ivl_cf_frame_t *frame, ivl_in_t *in)
+{
+    if (!frame->is_other)
+    {
+        return;
+    }
+    const ivl_sincos_t full = ivl_sincos(frame->turn_rad), half = ivl_sincos(0.5f * frame->turn_rad);
+    const ivl_quat_t   q = in->q_WB;
+    in->p_WB_m = ivl_add(turned(ivl_sub(in->p_WB_m, frame->from_W_m), full), frame->to_m);
+    in->v_WB_mps = turned(in->v_WB_mps, full);
+    in->q_WB = (ivl_quat_t){
+        half.cos * q.x - half.sin * q.y,
+        half.cos * q.y + half.sin * q.x,
+        half.cos * q.z + half.sin * q.w,
+        half.cos * q.w - half.sin * q.z,
+    };
+}

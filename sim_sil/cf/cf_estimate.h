@@ -16,6 +16,18 @@ typedef struct
     ivl_attitude_t attitude;  ///< carried on with the gyro in between
 } ivl_cf_estimate_t;
 
+/// Axes of an estimate that did not begin where the vehicle was, as one without position from outside.
+typedef struct
+{
+    bool       is_other;  ///< than the world's
+    ivl_vec3_t from_W_m;  ///< the vehicle when it began
+    ivl_vec3_t to_m;      ///< and what it was told
+    float      turn_rad;
+} ivl_cf_frame_t;
+
+/// A sample of the world as that estimate has it.
+void ivl_cf_frame_apply(const ivl_cf_frame_t *frame, ivl_in_t *in);
+
 void ivl_cf_estimate_reset(ivl_cf_estimate_t *e);
 
 /// A packet has arrived.

@@ -17,9 +17,10 @@ void ivl_cf_power_full(ivl_cf_power_t *power);
 
 /// @param[in] thrust_norm  total thrust as a share of the weight
 /// @param[in] fixed_V      > 0: the voltage is this one
-void ivl_cf_power_step(ivl_cf_power_t *power, float thrust_norm, float fixed_V, uint32_t dt_ms);
+/// @param[in] low_V        at this voltage and below it is low
+void ivl_cf_power_step(ivl_cf_power_t *power, float thrust_norm, float fixed_V, float low_V, uint32_t dt_ms);
 
-/// Percent of the charge.
+/// Percent of the charge, as the voltage tells it.
 uint8_t ivl_cf_power_level(const ivl_cf_power_t *power);
 
 /// 0 on battery, 3 low for some seconds.

@@ -50,7 +50,7 @@ float pmGetBatteryVoltage(void)
 
 bool supervisorCanFly(void)
 {
-    return ivl_cf_supervisor_motors_allowed(&ivl_cf_the.supervisor);
+    return ivl_cf_supervisor_can_fly(&ivl_cf_the.supervisor);
 }
 
 bool crtpIsConnected(void)
@@ -77,7 +77,7 @@ void commanderRelaxPriority(void)
 /// Only where the world has such a sensor: in the process of the host there is no other.
 float rangeGet(rangeDirection_t direction)
 {
-    return (direction == rangeUp && ivl_cf_the.has_range) ? (float)ivl_cf_the.range_up_mm : 0.0f;
+    return (direction == rangeUp && ivl_cf_the.has_range) ? (float)ivl_cf_the.range_mm[IVL_CF_UP] : 0.0f;
 }
 
 /// The world's alone: its sensors and motors know no other.

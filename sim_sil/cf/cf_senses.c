@@ -36,10 +36,33 @@ static void estimate(ivl_cf_t *cf, const ivl_in_t *before)
         cf->sensed.p_WB_m = before->p_WB_m;
         cf->sensed.v_WB_mps = before->v_WB_mps;
     }
-    else if (cf->set.pose_source != 0u)
+    else if (cf->set.sim.pose_source != 0u)
     {
         ivl_cf_estimate_fill(&cf->estimate, (float)cf->model.tick_s, &cf->sensed);
     }
+    else
+    {
+        ivl_cf_frame_apply(&cf->frame, &cf->sensed);
+    }
+}
+
+void ivl_cf_begin_estimate(ivl_cf_t *cf)
+{
+    const float     *to = cf->set.initial_m, yaw_rad = cf->set.initial_yaw_rad;
+    const ivl_vec3_t to_m = {to[0], to[1], to[2]};
+    const float      most = IVL_SENSE_P_M_MAX;
+    ivl_cf_estimate_reset(&cf->estimate);
+    // what is no number, or nowhere, is where the vehicle is
+    const bool is_place =
+        ivl_vec3_within(to_m, most) && ivl_within(yaw_rad, most) && !(ivl_vec3_within(to_m, 0.0f) && ivl_within(yaw_rad, 0.0f));
+    const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
+    const ivl_quat_t    q = {(float)kin.q_WB[0], (float)kin.q_WB[1], (float)kin.q_WB[2], (float)kin.q_WB[3]};
+    cf->frame = (ivl_cf_frame_t){
+        .is_other = is_place,
+        .from_W_m = {(float)kin.p_WB_m[0], (float)kin.p_WB_m[1], (float)kin.p_WB_m[2]},
+        .to_m = to_m,
+        .turn_rad = is_place ? ivl_cf_wrapped(yaw_rad - ivl_cf_yaw_of(q)) : 0.0f,
+    };
 }
 
 /// Degrees, the pitch nose up: the other way than a turn about y.
@@ -74,7 +97,7 @@ void ivl_cf_sense(ivl_cf_t *cf, const ivl_in_t *in)
     filter_force(cf);
     if (cf->has_range)
     {
-        cf->range_up_mm = (uint16_t)ivl_sim_sdk_range_mm(&cf->sensed.range);
+        cf->range_mm[IVL_CF_UP] = (uint16_t)ivl_sim_sdk_range_mm(&cf->sensed.range);
     }
     if (cf->model.has_readings)
     {

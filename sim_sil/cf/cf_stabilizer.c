@@ -84,6 +84,11 @@ static setpoint_t sdk_setpoint(const ivl_cf_setpoint_t *sp)
 
 void ivl_cf_stabilize(ivl_cf_t *cf)
 {
+    if (!cf->is_on)
+    {
+        memset(cf->motor_N, 0, sizeof cf->motor_N);
+        return;
+    }
     cf->setpoint = ivl_cf_setpoint(cf);
     const setpoint_t       setpoint = sdk_setpoint(&cf->setpoint);
     const stabilizerStep_t step = (stabilizerStep_t)cf->t_ms;

@@ -12,6 +12,8 @@ static const float LEAD_M = 0.3f;
 static const float LEAD_RAD = 1.0f;
 static const float TILT_RAD_MAX = 0.9f;
 static const float PI_F = 3.14159265f;
+// A way of a few hundredths of a second asks for tens of g, which no vehicle follows: more than this of an acceleration is left out.
+static const float ACCEL_MPS2_MAX = 5.0f;
 
 void ivl_cf_stock_reset(ivl_cf_stock_t *stock)
 {
@@ -49,16 +51,23 @@ static void want_heading(ivl_cf_stock_t *stock, const ivl_sample_t *now, const i
 
 static void want_tilt(ivl_cf_stock_t *stock, const ivl_cf_setpoint_t *sp, float dt_s)
 {
-    const bool rates = sp->tilt == IVL_CF_MODE_VELOCITY;
-    stock->roll = ivl_clamp(rates ? stock->roll + sp->roll * dt_s : sp->roll, -TILT_RAD_MAX, TILT_RAD_MAX);
-    stock->pitch = ivl_clamp(rates ? stock->pitch + sp->pitch * dt_s : sp->pitch, -TILT_RAD_MAX, TILT_RAD_MAX);
+    const bool roll_turns = sp->roll_mode == IVL_CF_MODE_VELOCITY, pitch_turns = sp->pitch_mode == IVL_CF_MODE_VELOCITY;
+    stock->roll = ivl_clamp(roll_turns ? stock->roll + sp->roll * dt_s : sp->roll, -TILT_RAD_MAX, TILT_RAD_MAX);
+    stock->pitch = ivl_clamp(pitch_turns ? stock->pitch + sp->pitch * dt_s : sp->pitch, -TILT_RAD_MAX, TILT_RAD_MAX);
+}
+
+static ivl_vec3_t limited(ivl_vec3_t a)
+{
+    return ivl_vec3(ivl_clamp(a.x, -ACCEL_MPS2_MAX, ACCEL_MPS2_MAX), ivl_clamp(a.y, -ACCEL_MPS2_MAX, ACCEL_MPS2_MAX),
+                    ivl_clamp(a.z, -ACCEL_MPS2_MAX, ACCEL_MPS2_MAX));
 }
 
 /// Horizontal part of the reference, in W.
 static void want_xy(ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sample_t *now, const ivl_cf_setpoint_t *sp, float dt_s,
                     ivl_reference_t *ref)
 {
-    const ivl_sincos_t heading = ivl_sincos(stock->yaw_rad);
+    // sticks and body axes are those of the vehicle, wherever it has come on its way to the wanted heading
+    const ivl_sincos_t heading = ivl_sincos(ivl_cf_yaw_of(now->q_WB));
     if (sp->xy == IVL_CF_MODE_OFF)
     {
         // no error of position and velocity, and the acceleration that this tilt makes
@@ -72,7 +81,7 @@ static void want_xy(ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sampl
     if (sp->xy == IVL_CF_MODE_ABS)
     {
         stock->p_W_m.x = sp->p_W_m.x, stock->p_W_m.y = sp->p_W_m.y;
-        ref->a_W_mps2 = sp->a_W_mps2;
+        ref->a_W_mps2 = limited(sp->a_W_mps2);
         return;
     }
     stock->p_W_m.x = drawn_along(stock->p_W_m.x, ref->v_W_mps.x, dt_s, now->p_WB_m.x);
@@ -91,7 +100,7 @@ static void want_z(ivl_cf_stock_t *stock, const ivl_sample_t *now, const ivl_cf_
     {
         stock->p_W_m.z = sp->p_W_m.z;
         ref->v_W_mps.z = sp->v_mps.z;
-        ref->a_W_mps2.z = sp->a_W_mps2.z;
+        ref->a_W_mps2.z = limited(sp->a_W_mps2).z;
     }
     else
     {

@@ -29,7 +29,7 @@ typedef struct
     ivl_cf_state_t to;
 } exit_t;
 
-// the first row that fits is taken
+// the first row that fits is taken; row by row those of the stock firmware, but for decks and for motors that report their speed
 static const exit_t EXITS[] = {
     {IVL_CF_STATE_BOOT, 0, 0, IVL_CF_STATE_CHECKS_FAILED},
 
@@ -38,31 +38,36 @@ static const exit_t EXITS[] = {
 
     {IVL_CF_STATE_CHECKS_PASSED, IVL_CF_COND_ESTOP, 0, IVL_CF_STATE_EXCEPTION},
     {IVL_CF_STATE_CHECKS_PASSED, IVL_CF_COND_TUMBLED, 0, IVL_CF_STATE_CHECKS_FAILED},
-    {IVL_CF_STATE_CHECKS_PASSED, IVL_CF_COND_ARMED, 0, IVL_CF_STATE_READY},
+    {IVL_CF_STATE_CHECKS_PASSED, IVL_CF_COND_ARMED, 0, IVL_CF_STATE_ARMING},
+
+    {IVL_CF_STATE_ARMING, IVL_CF_COND_ESTOP, 0, IVL_CF_STATE_EXCEPTION},
+    {IVL_CF_STATE_ARMING, IVL_CF_COND_TUMBLED, 0, IVL_CF_STATE_CHECKS_FAILED},
+    {IVL_CF_STATE_ARMING, 0, IVL_CF_COND_ARMED, IVL_CF_STATE_CHECKS_FAILED},
+    {IVL_CF_STATE_ARMING, 0, 0, IVL_CF_STATE_READY},
 
     {IVL_CF_STATE_READY, IVL_CF_COND_ESTOP, 0, IVL_CF_STATE_EXCEPTION},
     {IVL_CF_STATE_READY, IVL_CF_COND_TUMBLED, 0, IVL_CF_STATE_CHECKS_FAILED},
+    {IVL_CF_STATE_READY, IVL_CF_COND_PREFLIGHT_OVER, 0, IVL_CF_STATE_CHECKS_FAILED},
     {IVL_CF_STATE_READY, 0, IVL_CF_COND_ARMED, IVL_CF_STATE_CHECKS_FAILED},
     {IVL_CF_STATE_READY, IVL_CF_COND_FLYING, 0, IVL_CF_STATE_FLYING},
-    {IVL_CF_STATE_READY, IVL_CF_COND_PREFLIGHT_OVER, 0, IVL_CF_STATE_CHECKS_PASSED},
 
-    {IVL_CF_STATE_FLYING, IVL_CF_COND_ESTOP, 0, IVL_CF_STATE_EXCEPTION},
     {IVL_CF_STATE_FLYING, IVL_CF_COND_SETPOINT_DEAD, 0, IVL_CF_STATE_EXCEPTION},
+    {IVL_CF_STATE_FLYING, IVL_CF_COND_ESTOP, 0, IVL_CF_STATE_EXCEPTION},
     {IVL_CF_STATE_FLYING, IVL_CF_COND_TUMBLED, 0, IVL_CF_STATE_CRASHED},
     {IVL_CF_STATE_FLYING, 0, IVL_CF_COND_ARMED, IVL_CF_STATE_RESET},
     {IVL_CF_STATE_FLYING, IVL_CF_COND_SETPOINT_OLD, 0, IVL_CF_STATE_LEVEL_OUT},
     {IVL_CF_STATE_FLYING, 0, IVL_CF_COND_FLYING, IVL_CF_STATE_LANDED},
 
     {IVL_CF_STATE_LANDED, IVL_CF_COND_LANDED_OVER, 0, IVL_CF_STATE_RESET},
+    {IVL_CF_STATE_LANDED, 0, IVL_CF_COND_ARMED, IVL_CF_STATE_RESET},
     {IVL_CF_STATE_LANDED, IVL_CF_COND_FLYING, 0, IVL_CF_STATE_FLYING},
 
     {IVL_CF_STATE_RESET, 0, 0, IVL_CF_STATE_CHECKS_FAILED},
 
-    {IVL_CF_STATE_LEVEL_OUT, IVL_CF_COND_ESTOP, 0, IVL_CF_STATE_EXCEPTION},
     {IVL_CF_STATE_LEVEL_OUT, IVL_CF_COND_SETPOINT_DEAD, 0, IVL_CF_STATE_EXCEPTION},
     {IVL_CF_STATE_LEVEL_OUT, IVL_CF_COND_TUMBLED, 0, IVL_CF_STATE_EXCEPTION},
-    {IVL_CF_STATE_LEVEL_OUT, 0, IVL_CF_COND_ARMED, IVL_CF_STATE_EXCEPTION},
-    {IVL_CF_STATE_LEVEL_OUT, 0, IVL_CF_COND_SETPOINT_OLD, IVL_CF_STATE_FLYING},
+    {IVL_CF_STATE_LEVEL_OUT, IVL_CF_COND_ESTOP, 0, IVL_CF_STATE_EXCEPTION},
+    {IVL_CF_STATE_LEVEL_OUT, 0, IVL_CF_COND_SETPOINT_OLD | IVL_CF_COND_SETPOINT_DEAD, IVL_CF_STATE_FLYING},
 
     {IVL_CF_STATE_EXCEPTION, 0, 0, IVL_CF_STATE_LOCKED},
 
@@ -74,6 +79,7 @@ static const char *const NAMES[] = {
     [IVL_CF_STATE_BOOT] = "Not initialized",
     [IVL_CF_STATE_CHECKS_FAILED] = "Pre-flight checks not passed",
     [IVL_CF_STATE_CHECKS_PASSED] = "Pre-flight checks passed",
+    [IVL_CF_STATE_ARMING] = "Arming",
     [IVL_CF_STATE_READY] = "Ready to fly",
     [IVL_CF_STATE_FLYING] = "Flying",
     [IVL_CF_STATE_LANDED] = "Landed",
@@ -108,7 +114,12 @@ const char *ivl_cf_supervisor_name(ivl_cf_state_t state)
 static bool is_tumbled(ivl_cf_supervisor_t *s, const ivl_cf_supervisor_in_t *in)
 {
     const float *a = in->acc_g;
-    const bool   falls = fabsf(a[0]) < FREE_FALL_G && fabsf(a[1]) < FREE_FALL_G && fabsf(a[2]) < FREE_FALL_G;
+    s->force_g = sqrtf(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
+    if (s->crash_g > 0.0f && fabsf(s->force_g - 1.0f) > s->crash_g)
+    {
+        return true;
+    }
+    const bool falls = fabsf(a[0]) < FREE_FALL_G && fabsf(a[1]) < FREE_FALL_G && fabsf(a[2]) < FREE_FALL_G;
     if (falls || a[2] >= TILTED_G)
     {
         // the clock stands; a free fall starts it anew
@@ -203,6 +214,7 @@ void ivl_cf_supervisor_fly(ivl_cf_supervisor_t *s, uint32_t now_ms)
         .auto_arm = s->auto_arm,
         .preflight_ms_max = s->preflight_ms_max,
         .landed_ms_max = s->landed_ms_max,
+        .crash_g = s->crash_g,
         .state = IVL_CF_STATE_FLYING,
         .armed = true,
         .has_thrust = true,
@@ -238,6 +250,11 @@ void ivl_cf_supervisor_watchdog(ivl_cf_supervisor_t *s, uint32_t now_ms)
 
 bool ivl_cf_supervisor_motors_allowed(const ivl_cf_supervisor_t *s)
 {
+    return s->state == IVL_CF_STATE_ARMING || ivl_cf_supervisor_can_fly(s);
+}
+
+bool ivl_cf_supervisor_can_fly(const ivl_cf_supervisor_t *s)
+{
     return s->state == IVL_CF_STATE_READY || s->state == IVL_CF_STATE_FLYING || s->state == IVL_CF_STATE_LEVEL_OUT ||
            s->state == IVL_CF_STATE_LANDED;
 }
@@ -252,7 +269,7 @@ uint16_t ivl_cf_supervisor_bits(const ivl_cf_supervisor_t *s)
     const bool bits[] = {s->state == IVL_CF_STATE_CHECKS_PASSED,
                          s->armed,
                          s->auto_arm != 0u,
-                         ivl_cf_supervisor_motors_allowed(s),
+                         ivl_cf_supervisor_can_fly(s),
                          ivl_cf_supervisor_is_flying(s),
                          s->tumbled,
                          s->state == IVL_CF_STATE_LOCKED,

@@ -10,7 +10,8 @@ typedef enum
     IVL_CF_STATE_BOOT,
     IVL_CF_STATE_CHECKS_FAILED,  ///< before flight: tumbled
     IVL_CF_STATE_CHECKS_PASSED,  ///< may be armed
-    IVL_CF_STATE_READY,          ///< armed, motors may run
+    IVL_CF_STATE_ARMING,         ///< armed; brushed motors have nothing to wait for
+    IVL_CF_STATE_READY,          ///< motors may run
     IVL_CF_STATE_FLYING,
     IVL_CF_STATE_LANDED,
     IVL_CF_STATE_RESET,
@@ -33,6 +34,7 @@ enum
     IVL_CF_COND_CRASHED = 1u << 6,
     IVL_CF_COND_PREFLIGHT_OVER = 1u << 7,
     IVL_CF_COND_LANDED_OVER = 1u << 8,
+    IVL_CF_COND_COUNT = 9
 };
 
 /// What it looks at.
@@ -52,10 +54,12 @@ typedef struct
     uint8_t  dump_info;
     uint16_t preflight_ms_max;
     uint16_t landed_ms_max;
+    float    crash_g;  ///< a force that differs by more from 1 g is a crash; 0: no such check
 
     ivl_cf_state_t state;
     uint32_t       conditions;
     bool           armed, crashed, tumbled;
+    float          force_g;  ///< norm of the filtered specific force
     bool           estop;
     bool           has_tumble, has_thrust, has_watchdog;
     uint32_t       t_tumble_ms, t_thrust_ms, t_watchdog_ms, t_ready_ms, t_landed_ms;
@@ -81,6 +85,9 @@ bool ivl_cf_supervisor_recover(ivl_cf_supervisor_t *s);
 void ivl_cf_supervisor_watchdog(ivl_cf_supervisor_t *s, uint32_t now_ms);
 
 bool ivl_cf_supervisor_motors_allowed(const ivl_cf_supervisor_t *s);
+
+/// What clients are told, and what the high-level commander waits for.
+bool ivl_cf_supervisor_can_fly(const ivl_cf_supervisor_t *s);
 bool ivl_cf_supervisor_is_flying(const ivl_cf_supervisor_t *s);
 
 /// Bits 0..7 of the info field; the planner's follow.

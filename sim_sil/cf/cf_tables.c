@@ -1,5 +1,10 @@
 /// @file cf_tables.c
-/// Parameters and log variables that are served: those of the stock firmware that are modelled, those of the simulator, and the app's own.
+/// Parameters and log variables that are served: those of the list in cf_names.h, and the app's own.
+#include <math.h>
+#include <string.h>
+
+#include "app_convert.h"
+#include "cf_names.h"
 #include "cf_vehicle.h"
 #include "controller.h"
 #include "log.h"
@@ -22,39 +27,45 @@ static double limited(double value, double lo, double hi, double otherwise)
 
 static void reset_written(void)
 {
-    if (THE.set.reset != 0u)
+    if (THE.set.sim.reset != 0u)
     {
-        THE.set.reset = 0;
+        THE.set.sim.reset = 0;
         ivl_cf_world_reset(&THE);
-        ivl_cf_param_changed(&THE, &THE.set.reset);
+        ivl_cf_param_changed(&THE, &THE.set.sim.reset);
     }
 }
 
 static void start_written(void)
 {
-    if (THE.set.start >= IVL_SIM_START_STATE && THE.set.start != IVL_CF_START_AS_FLOWN)
+    if (THE.set.sim.start >= IVL_SIM_START_STATE && THE.set.sim.start != IVL_CF_START_AS_FLOWN)
     {
-        THE.set.start = IVL_CF_START_AS_FLOWN;
-        ivl_cf_param_changed(&THE, &THE.set.start);
+        THE.set.sim.start = IVL_CF_START_AS_FLOWN;
+        ivl_cf_param_changed(&THE, &THE.set.sim.start);
     }
 }
 
 static void numbers_written(void)
 {
     const double ceiling_m = THE.model.raw.world_ceiling_height_m;
-    THE.set.d_ceil_m = limited(THE.set.d_ceil_m, D_CEIL_M[0], D_CEIL_M[1], 0.5);
-    THE.set.speed_mps = limited(THE.set.speed_mps, 0.0, 100.0, 0.0);
-    THE.set.angle_deg = limited(THE.set.angle_deg, 0.0, 90.0, 0.0);
-    THE.set.start_x_m = (float)limited((double)THE.set.start_x_m, -50.0, 50.0, 0.0);
-    THE.set.start_y_m = (float)limited((double)THE.set.start_y_m, -50.0, 50.0, 0.0);
-    THE.set.start_z_m = (float)limited((double)THE.set.start_z_m, 0.0, ceiling_m - THE.model.reach_m, 0.5 * ceiling_m);
-    THE.set.vbat_V = (float)limited((double)THE.set.vbat_V, 0.0, 30.0, 0.0);
+    THE.set.sim.d_ceil_m = limited(THE.set.sim.d_ceil_m, D_CEIL_M[0], D_CEIL_M[1], 0.5);
+    THE.set.sim.speed_mps = limited(THE.set.sim.speed_mps, 0.0, 100.0, 0.0);
+    THE.set.sim.angle_deg = limited(THE.set.sim.angle_deg, 0.0, 90.0, 0.0);
+    THE.set.sim.start_x_m = (float)limited((double)THE.set.sim.start_x_m, -50.0, 50.0, 0.0);
+    THE.set.sim.start_y_m = (float)limited((double)THE.set.sim.start_y_m, -50.0, 50.0, 0.0);
+    THE.set.sim.start_z_m = (float)limited((double)THE.set.sim.start_z_m, 0.0, ceiling_m - THE.model.reach_m, 0.5 * ceiling_m);
+    THE.set.sim.vbat_V = (float)limited((double)THE.set.sim.vbat_V, 0.0, 30.0, 0.0);
+    THE.set.sim.wall_x_m = (float)limited((double)THE.set.sim.wall_x_m, 0.0, 50.0, 0.0);
+    THE.set.sim.wall_y_m = (float)limited((double)THE.set.sim.wall_y_m, 0.0, 50.0, 0.0);
+    THE.set.takeoff_mps = (float)limited((double)THE.set.takeoff_mps, 0.01, 100.0, 0.5);
+    THE.set.landing_mps = (float)limited((double)THE.set.landing_mps, 0.01, 100.0, 0.5);
 }
 
+/// 0 chooses the app, as it does on the drone.  Each of the stock firmware's controllers is the one stock law here.
 static void controller_written(void)
 {
-    const bool was_stock = THE.runs_stock;
-    THE.runs_stock = THE.set.controller == IVL_CF_CONTROLLER_STOCK;
+    const bool    was_stock = THE.runs_stock;
+    const uint8_t asked = THE.set.controller;
+    THE.runs_stock = asked >= IVL_CF_CONTROLLER_STOCK && asked < IVL_CF_CONTROLLER_APP;
     if (!THE.runs_stock)
     {
         THE.set.controller = IVL_CF_CONTROLLER_APP;
@@ -62,6 +73,14 @@ static void controller_written(void)
         {
             controllerOutOfTreeInit();
         }
+    }
+    if (THE.set.controller != asked)
+    {
+        ivl_cf_param_changed(&THE, &THE.set.controller);
+    }
+    if (THE.runs_stock && asked != IVL_CF_CONTROLLER_STOCK)
+    {
+        ivl_cf_print("CONTROLLER: %u flies the simulated stock law; its own gains change nothing\n", (unsigned)asked);
     }
     ivl_cf_stock_reset(&THE.stock);
 }
@@ -71,7 +90,7 @@ static void estimation_written(void)
     if (THE.set.reset_estimation != 0u)
     {
         THE.set.reset_estimation = 0;
-        ivl_cf_estimate_reset(&THE.estimate);
+        ivl_cf_begin_estimate(&THE);
         ivl_cf_param_changed(&THE, &THE.set.reset_estimation);
     }
 }
@@ -80,6 +99,42 @@ static void health_written(void)
 {
     THE.set.prop_test = THE.set.battery_test = 0;
     ivl_cf_print("HEALTH: the simulated vehicle has no tests of propellers and battery\n");
+}
+
+/// What a task, a memory and an assertion of the firmware would say.
+static void system_written(void)
+{
+    if (THE.set.task_dump != 0u)
+    {
+        ivl_cf_print("Task dump\nLoad\tStack left\tName\nthe simulated vehicle has no tasks\n");
+    }
+    if (THE.set.assert_info != 0u)
+    {
+        ivl_cf_print("No assertion has failed: the simulated vehicle ends where the firmware would stop\n");
+    }
+    if (THE.set.storage_stats != 0u)
+    {
+        ivl_cf_print("STORAGE: the simulated vehicle keeps a value for each persistent parameter\n");
+    }
+    uint8_t *const asked[] = {&THE.set.task_dump, &THE.set.assert_info, &THE.set.storage_stats};
+    for (size_t i = 0; i < sizeof asked / sizeof asked[0]; i++)
+    {
+        if (*asked[i] != 0u)
+        {
+            *asked[i] = 0;
+            ivl_cf_param_changed(&THE, asked[i]);
+        }
+    }
+}
+
+static void place_written(void)
+{
+    if (THE.set.sim.place != 0u)
+    {
+        THE.set.sim.place = 0;
+        ivl_cf_world_place(&THE);
+        ivl_cf_param_changed(&THE, &THE.set.sim.place);
+    }
 }
 
 static void info_written(void)
@@ -92,172 +147,107 @@ static void info_written(void)
     }
 }
 
-// ---- parameters
+// ---- the list, as tables
 
-#define RW(type_, group_, name_, where, then) {.group = group_, .name = name_, .type = type_, .address = &(where), .changed = then},
-#define RO(type_, group_, name_, where)       {.group = group_, .name = name_, .type = type_, .read_only = true, .address = &(where)},
-#define KEPT(type_, group_, name_, where, then)                                                                                            \
-    {.group = group_, .name = name_, .type = type_, .persistent = true, .address = &(where), .changed = then},
-#define U8  IVL_CF_PARAM_U8
-#define U16 IVL_CF_PARAM_U16
-#define U32 IVL_CF_PARAM_U32
-#define F32 IVL_CF_PARAM_F32
-#define F64 IVL_CF_PARAM_F64
-
-// clang-format off
-static const ivl_cf_param_t PARAMS[] = {
-    RW(U8,  "sil", "reset",       THE.set.reset, reset_written)
-    RW(U8,  "sil", "start",       THE.set.start, start_written)
-    RW(U32, "sil", "seed_lo",     THE.set.seed_lo, NULL)
-    RW(U32, "sil", "seed_hi",     THE.set.seed_hi, NULL)
-    RW(U32, "sil", "stream_lo",   THE.set.stream_lo, NULL)
-    RW(U32, "sil", "stream_hi",   THE.set.stream_hi, NULL)
-    RW(F64, "sil", "d_ceil",      THE.set.d_ceil_m, numbers_written)
-    RW(F64, "sil", "speed",       THE.set.speed_mps, numbers_written)
-    RW(F64, "sil", "angle",       THE.set.angle_deg, numbers_written)
-    RW(F32, "sil", "start_x",     THE.set.start_x_m, numbers_written)
-    RW(F32, "sil", "start_y",     THE.set.start_y_m, numbers_written)
-    RW(F32, "sil", "start_z",     THE.set.start_z_m, numbers_written)
-    RW(F32, "sil", "vbat",        THE.set.vbat_V, numbers_written)
-    RW(U8,  "sil", "pose_source", THE.set.pose_source, estimation_written)
-    RW(U8,  "sil", "auto_arm",    THE.supervisor.auto_arm, NULL)
-
-    RW(U8,   "stabilizer", "estimator",  THE.set.estimator, NULL)
-    RW(U8,   "stabilizer", "controller", THE.set.controller, controller_written)
-    RW(U8,   "stabilizer", "stop",       THE.supervisor.stop, NULL)
-    KEPT(U8, "supervisor", "tmblChckEn",  tumbleCheckEnabled, NULL)
-    RW(U8,   "supervisor", "infdmp",      THE.supervisor.dump_info, info_written)
-    RW(U16,  "supervisor", "prefltTimeout", THE.supervisor.preflight_ms_max, NULL)
-    RW(U16,  "supervisor", "landedTimeout", THE.supervisor.landed_ms_max, NULL)
-    RW(U8,   "kalman", "resetEstimation", THE.set.reset_estimation, estimation_written)
-    RW(F32,  "locSrv", "extPosStdDev",  THE.set.ext_pos_sigma_m, NULL)
-    RW(F32,  "locSrv", "extQuatStdDev", THE.set.ext_quat_sigma_rad, NULL)
-    RW(U8,   "motorPowerSet", "enable", THE.set.bypass, NULL)
-    RW(U16,  "motorPowerSet", "m1", THE.set.bypass_pwm[0], NULL)
-    RW(U16,  "motorPowerSet", "m2", THE.set.bypass_pwm[1], NULL)
-    RW(U16,  "motorPowerSet", "m3", THE.set.bypass_pwm[2], NULL)
-    RW(U16,  "motorPowerSet", "m4", THE.set.bypass_pwm[3], NULL)
-    RW(U8,   "flightmode", "althold",       THE.set.alt_hold, NULL)
-    RW(U8,   "flightmode", "poshold",       THE.set.pos_hold, NULL)
-    RW(U8,   "flightmode", "stabModeRoll",  THE.set.stab_roll, NULL)
-    RW(U8,   "flightmode", "stabModePitch", THE.set.stab_pitch, NULL)
-    RW(U8,   "flightmode", "stabModeYaw",   THE.set.stab_yaw, NULL)
-    RW(U8,   "commander", "enHighLevel", THE.set.high_level, NULL)
-    RW(U8,   "health", "startPropTest", THE.set.prop_test, health_written)
-    RW(U8,   "health", "startBatTest",  THE.set.battery_test, health_written)
-    RW(U8,   "ring", "effect",          THE.set.ring_effect, NULL)
-    RO(U8,   "ring", "neffect",         THE.set.ring_n_effect)
-    RW(U8,   "ring", "headlightEnable", THE.set.ring_headlight, NULL)
-    RO(U8,  "deck", "bcFlow2",       THE.set.deck)
-    RO(U8,  "deck", "bcMultiranger", THE.set.deck)
-    RO(U8,  "deck", "bcZRanger",     THE.set.no_deck)
-    RO(U8,  "deck", "bcZRanger2",    THE.set.no_deck)
-    RO(U8,  "deck", "bcFlow",        THE.set.no_deck)
-    RO(U8,  "deck", "bcLighthouse4", THE.set.no_deck)
-    RO(U8,  "deck", "bcLoco",        THE.set.no_deck)
-    RO(U8,  "deck", "bcDWM1000",     THE.set.no_deck)
-    RO(U8,  "deck", "bcLedRing",     THE.set.no_deck)
-    RO(U8,  "deck", "bcColorLedTop", THE.set.no_deck)
-    RO(U8,  "deck", "bcColorLedBot", THE.set.no_deck)
-    RO(U32, "firmware", "revision0", THE.set.revision0)
-    RO(U16, "firmware", "revision1", THE.set.revision1)
-    RO(U8,  "firmware", "modified",  THE.set.modified)
-    {.group = "system", .name = "selftestPassed", .type = IVL_CF_PARAM_I8, .read_only = true, .address = &THE.set.selftest_passed},
+enum
+{
+    N = 0,
+    C = 1,
+    P = 2,
+    R = 4,
+    CP = C | P,
+    CR = C | R
 };
-// clang-format on
 
-// ---- log variables: X(c type, group, name, value), with the vehicle cf, its input in, what follows from it e and the truth kin
+#define HELD_VALUE(type_, group_, name_, access, value) .group_##_##name_ = value,
+static const ivl_cf_held_t FIRST = {IVL_CF_PARAMS(IVL_CF_NOTHING, HELD_VALUE)};
 
-// clang-format off
-#define LOGS(X) \
-    X(uint32_t, "sil", "time_ms",  time_ms,  (uint32_t)cf->t_ms) \
-    X(uint32_t, "sil", "episode",  episode,  cf->episode.number) \
-    X(uint8_t,  "sil", "ended",    ended,    cf->episode.ended) \
-    X(uint8_t,  "sil", "grounded", grounded, cf->grounded ? 1u : 0u) \
-    X(uint32_t, "sil", "n_pose",   n_pose,   cf->estimate.n) \
-    X(float, "stateEstimate", "x",  x,  in->p_WB_m.x) \
-    X(float, "stateEstimate", "y",  y,  in->p_WB_m.y) \
-    X(float, "stateEstimate", "z",  z,  in->p_WB_m.z) \
-    X(float, "stateEstimate", "vx", vx, in->v_WB_mps.x) \
-    X(float, "stateEstimate", "vy", vy, in->v_WB_mps.y) \
-    X(float, "stateEstimate", "vz", vz, in->v_WB_mps.z) \
-    X(float, "stateEstimate", "ax", ax, e.a_g.x) \
-    X(float, "stateEstimate", "ay", ay, e.a_g.y) \
-    X(float, "stateEstimate", "az", az, e.a_g.z) \
-    X(float, "stateEstimate", "roll",  roll,  cf->state.attitude.roll) \
-    X(float, "stateEstimate", "pitch", pitch, cf->state.attitude.pitch) \
-    X(float, "stateEstimate", "yaw",   yaw,   cf->state.attitude.yaw) \
-    X(float, "stateEstimate", "qx", qx, in->q_WB.x) \
-    X(float, "stateEstimate", "qy", qy, in->q_WB.y) \
-    X(float, "stateEstimate", "qz", qz, in->q_WB.z) \
-    X(float, "stateEstimate", "qw", qw, in->q_WB.w) \
-    X(float, "stabilizer", "roll",  s_roll,  cf->state.attitude.roll) \
-    X(float, "stabilizer", "pitch", s_pitch, cf->state.attitude.pitch) \
-    X(float, "stabilizer", "yaw",   s_yaw,   cf->state.attitude.yaw) \
-    X(float, "stabilizer", "thrust", s_thrust, 0.25f * (e.pwm[0] + e.pwm[1] + e.pwm[2] + e.pwm[3])) \
-    X(float, "gyro", "x", gyro_x, cf->sensors.gyro.x) \
-    X(float, "gyro", "y", gyro_y, cf->sensors.gyro.y) \
-    X(float, "gyro", "z", gyro_z, cf->sensors.gyro.z) \
-    X(float, "acc", "x", acc_x, cf->acc_g[0]) \
-    X(float, "acc", "y", acc_y, cf->acc_g[1]) \
-    X(float, "acc", "z", acc_z, cf->acc_g[2]) \
-    X(uint16_t, "motor", "m1", m1, (uint16_t)e.pwm[0]) \
-    X(uint16_t, "motor", "m2", m2, (uint16_t)e.pwm[1]) \
-    X(uint16_t, "motor", "m3", m3, (uint16_t)e.pwm[2]) \
-    X(uint16_t, "motor", "m4", m4, (uint16_t)e.pwm[3]) \
-    X(float,    "pm", "vbat",   vbat,   cf->power.vbat_V) \
-    X(uint16_t, "pm", "vbatMV", vbat_mV, (uint16_t)(cf->power.vbat_V * 1000.0f)) \
-    X(int8_t,   "pm", "state",  pm_state, ivl_cf_power_state(&cf->power)) \
-    X(uint8_t,  "pm", "batteryLevel", battery_level, ivl_cf_power_level(&cf->power)) \
-    X(uint16_t, "range", "up", range_up, cf->range_up_mm) \
-    X(uint16_t, "supervisor", "info", info, ivl_cf_supervisor_info(cf)) \
-    X(uint8_t, "sys", "canfly",    canfly,    ivl_cf_supervisor_motors_allowed(&cf->supervisor) ? 1u : 0u) \
-    X(uint8_t, "sys", "isFlying",  is_flying, ivl_cf_supervisor_is_flying(&cf->supervisor) ? 1u : 0u) \
-    X(uint8_t, "sys", "isTumbled", is_tumbled, cf->supervisor.tumbled ? 1u : 0u) \
-    X(float, "ctrltarget", "x", target_x, cf->commander.setpoint.p_W_m.x) \
-    X(float, "ctrltarget", "y", target_y, cf->commander.setpoint.p_W_m.y) \
-    X(float, "ctrltarget", "z", target_z, cf->commander.setpoint.p_W_m.z) \
-    X(float, "simTruth", "x",  true_x,  (float)kin.p_WB_m[0]) \
-    X(float, "simTruth", "y",  true_y,  (float)kin.p_WB_m[1]) \
-    X(float, "simTruth", "z",  true_z,  (float)kin.p_WB_m[2]) \
-    X(float, "simTruth", "vx", true_vx, (float)kin.v_WB_mps[0]) \
-    X(float, "simTruth", "vy", true_vy, (float)kin.v_WB_mps[1]) \
-    X(float, "simTruth", "vz", true_vz, (float)kin.v_WB_mps[2]) \
-    X(float, "simTruth", "qx", true_qx, (float)kin.q_WB[0]) \
-    X(float, "simTruth", "qy", true_qy, (float)kin.q_WB[1]) \
-    X(float, "simTruth", "qz", true_qz, (float)kin.q_WB[2]) \
-    X(float, "simTruth", "qw", true_qw, (float)kin.q_WB[3]) \
-    X(uint8_t, "simTruth", "feet", true_feet, (uint8_t)ivl_sim_world_count_stuck(&cf->group.world[IVL_CF_LANE]))
-// clang-format on
+#define PARAM_ROW(type_, group_, name_, access)                                                                                            \
+    .group = #group_, .name = #name_, .type = IVL_CF_PARAM_##type_, .read_only = ((access) & R) != 0, .persistent = ((access) & P) != 0,   \
+    .core = ((access) & C) != 0
+#define LIVE_PARAM(type_, group_, name_, access, where, then)                                                                              \
+    {PARAM_ROW(type_, group_, name_, access), .address = &(where), .changed = then},
+#define HELD_PARAM(type_, group_, name_, access, value)                                                                                    \
+    {PARAM_ROW(type_, group_, name_, access), .held = true, .address = &THE.held.group_##_##name_},
 
-static const float PWM_FULL = 65535.0f;
+static const ivl_cf_param_t PARAMS[] = {IVL_CF_PARAMS(LIVE_PARAM, HELD_PARAM)};
 
-#define MEMBER(c_type, group, name, member, value) c_type member;
 static struct
 {
-    LOGS(MEMBER)
+    IVL_CF_LOGS(IVL_CF_MEMBER, IVL_CF_MEMBER)
 } values;
 
-#define TYPE_OF(member)                                                                                                                    \
-    _Generic((values.member),                                                                                                              \
-        uint8_t: IVL_CF_LOG_U8,                                                                                                            \
-        uint16_t: IVL_CF_LOG_U16,                                                                                                          \
-        uint32_t: IVL_CF_LOG_U32,                                                                                                          \
-        int8_t: IVL_CF_LOG_I8,                                                                                                             \
-        float: IVL_CF_LOG_F32)
-#define LOG_LINE(c_type, group_, name_, member, value) {.group = group_, .name = name_, .type = TYPE_OF(member), .address = &values.member},
+#define LOG_ROW(type_, group_, name_, access)                                                                                              \
+    .group = #group_, .name = #name_, .type = IVL_CF_LOG_##type_, .address = &values.group_##_##name_, .core = ((access) & C) != 0
+#define LIVE_LOG(type_, group_, name_, access, value) {LOG_ROW(type_, group_, name_, access)},
+#define HELD_LOG(type_, group_, name_, access, value) {LOG_ROW(type_, group_, name_, access), .held = true},
+
 static const ivl_cf_log_t LOG_TABLE[] = {
-    LOGS(LOG_LINE)
+    IVL_CF_LOGS(LIVE_LOG, HELD_LOG) /* */
     // asked for by the app, so always up to date
     {.group = "kalman", .name = "varPX", .type = IVL_CF_LOG_F32, .address = &THE.variance_m2},
     {.group = "kalman", .name = "varPY", .type = IVL_CF_LOG_F32, .address = &THE.variance_m2},
     {.group = "kalman", .name = "varPZ", .type = IVL_CF_LOG_F32, .address = &THE.variance_m2},
 };
 
+// ---- what log variables show
+
+static const float   PWM_FULL = 65535.0f;
+static const float   DEG_PER_RAD = 57.2957795f;
+static const float   GYRO_DEGPS_PER_STEP = 2000.0f / 32768.0f;
+static const float   PRESSURE_MBAR = 1013.25f, MBAR_PER_M = 0.12f;  // at sea level
+static const uint8_t FLOW_MOVES = 0xB0, FLOW_QUALITY = 100;
+
+static int16_t whole(float value)
+{
+    // what is no number becomes the lower end
+    return (int16_t)((value > -32768.0f) ? ((value < 32767.0f) ? value : 32767.0f) : -32768.0f);
+}
+
+static int16_t milli(float value)
+{
+    return whole(value * 1000.0f);
+}
+
+static int16_t gyro_steps(float degps)
+{
+    return whole(degps / GYRO_DEGPS_PER_STEP);
+}
+
+static float angle_deg(ivl_cf_mode_t mode, float angle_rad)
+{
+    return (mode == IVL_CF_MODE_ABS) ? angle_rad * DEG_PER_RAD : 0.0f;
+}
+
+/// The largest of the four left out and made positive; the others with a sign and nine bits each.
+static uint32_t packed(ivl_quat_t q_WB)
+{
+    const float q[4] = {q_WB.x, q_WB.y, q_WB.z, q_WB.w};
+    uint32_t    largest = 0;
+    for (uint32_t i = 1; i < 4; i++)
+    {
+        largest = (fabsf(q[i]) > fabsf(q[largest])) ? i : largest;
+    }
+    uint32_t bits = largest;
+    for (uint32_t i = 0; i < 4; i++)
+    {
+        if (i != largest)
+        {
+            const bool  is_negative = (q[i] < 0.0f) != (q[largest] < 0.0f);
+            const float size = fabsf(q[i]) / 0.70710678f * 511.0f + 0.5f;
+            bits = bits << 10 | (is_negative ? 0x200u : 0u) | ((size < 511.0f) ? (uint32_t)size : 511u);
+        }
+    }
+    return bits;
+}
+
 typedef struct
 {
-    ivl_vec3_t a_g;  ///< acceleration in W, gravity removed
+    ivl_vec3_t a_g;                   ///< acceleration in W, gravity removed
+    ivl_vec3_t v_B;                   ///< velocity in B
+    ivl_vec3_t p_heading, v_heading;  ///< in axes that turn with the heading
     float      pwm[4];
+    float      gyro_variance;  ///< of its noise, in steps of the sensor
 } derived_t;
 
 static derived_t derive(const ivl_cf_t *cf)
@@ -267,6 +257,14 @@ static derived_t derive(const ivl_cf_t *cf)
     const float     *a = cf->acc_g;
     e.a_g = ivl_add(ivl_scale(r.x, a[0]), ivl_add(ivl_scale(r.y, a[1]), ivl_scale(r.z, a[2])));
     e.a_g.z -= 1.0f;
+    const ivl_in_t    *in = &cf->sensed;
+    const ivl_vec3_t   v = in->v_WB_mps, p = in->p_WB_m;
+    const ivl_sincos_t h = ivl_sincos(ivl_cf_yaw_of(in->q_WB));
+    e.v_B = ivl_vec3(ivl_dot(r.x, v), ivl_dot(r.y, v), ivl_dot(r.z, v));
+    e.v_heading = ivl_vec3(h.cos * v.x + h.sin * v.y, h.cos * v.y - h.sin * v.x, v.z);
+    e.p_heading = ivl_vec3(h.cos * p.x + h.sin * p.y, h.cos * p.y - h.sin * p.x, p.z);
+    const float noise = (float)cf->model.raw.sense_gyro_noise_radps * DEG_PER_RAD / GYRO_DEGPS_PER_STEP;
+    e.gyro_variance = noise * noise;
     for (int i = 0; i < 4; i++)
     {
         e.pwm[i] = ivl_clamp(cf->motor_N[i] / cf->model.firmware.motor_thrust_N_max, 0.0f, 1.0f) * PWM_FULL;
@@ -276,11 +274,12 @@ static derived_t derive(const ivl_cf_t *cf)
 
 void ivl_cf_logs_refresh(ivl_cf_t *cf)
 {
-    const ivl_in_t     *in = &cf->sensed;
-    const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
-    const derived_t     e = derive(cf);
-#define REFRESH(c_type, group, name, member, value) values.member = (value);
-    LOGS(REFRESH)
+    const ivl_in_t          *in = &cf->sensed;
+    const ivl_cf_setpoint_t *sp = &cf->commander.setpoint;
+    const ivl_sim_kin_t      kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
+    const derived_t          e = derive(cf);
+#define REFRESH(type_, group_, name_, access, value) values.group_##_##name_ = (value);
+    IVL_CF_LOGS(REFRESH, REFRESH)
 #undef REFRESH
 }
 
@@ -296,6 +295,11 @@ enum
 static ivl_cf_param_t all_params[N_PARAMS + N_APP_MAX];
 static ivl_cf_log_t   all_logs[N_LOGS + N_APP_MAX];
 static size_t         n_params, n_logs;
+
+void ivl_cf_tables_boot(ivl_cf_t *cf)
+{
+    cf->held = FIRST;
+}
 
 bool ivl_cf_tables_open(ivl_cf_t *cf)
 {

@@ -5,6 +5,7 @@
 #include "app_port.h"
 #include "cf.h"
 #include "cf_estimate.h"
+#include "cf_names.h"
 #include "cf_planner.h"
 #include "cf_power.h"
 #include "cf_queue.h"
@@ -20,30 +21,82 @@ enum
     IVL_CF_ESTIMATOR_KALMAN = 2,
     IVL_CF_START_AS_FLOWN = 255,
     IVL_CF_PLANNER_MS = 10,
-    IVL_CF_SUPERVISOR_MS = 40
+    IVL_CF_SUPERVISOR_MS = 40,
+    IVL_CF_EEPROM_BYTES = 8192,
+    IVL_CF_DECKS = 2,  ///< that can be attached
+    IVL_CF_ONE_WIRE_BYTES = 112
 };
+
+/// What the ends of a radio control's sticks mean.
+typedef struct
+{
+    float roll_degps, pitch_degps, yaw_degps;
+    float roll_deg, pitch_deg;
+} ivl_cf_cppm_t;
+
+/// Parameters of the simulation.
+typedef struct
+{
+    uint8_t  reset, place, start, pose_source;
+    uint32_t seed_lo, seed_hi, stream_lo, stream_hi;
+    double   d_ceil_m, speed_mps, angle_deg;
+    float    start_x_m, start_y_m, start_z_m;
+    float    wall_x_m, wall_y_m;  ///< walls at +- this, 0: none
+    float    vbat_V;
+} ivl_cf_simulation_t;
 
 /// Parameters that are nothing but numbers.
 typedef struct
 {
-    uint8_t  controller, estimator;
-    uint8_t  reset, start, pose_source;
-    uint32_t seed_lo, seed_hi, stream_lo, stream_hi;
-    double   d_ceil_m, speed_mps, angle_deg;
-    float    start_x_m, start_y_m, start_z_m;
-    float    vbat_V;
-    uint8_t  bypass;  ///< motorPowerSet.enable
-    uint16_t bypass_pwm[4];
-    uint8_t  alt_hold, pos_hold, stab_roll, stab_pitch, stab_yaw;
-    float    ext_pos_sigma_m, ext_quat_sigma_rad;
-    uint8_t  reset_estimation, prop_test, battery_test;
-    uint8_t  ring_effect, ring_n_effect, ring_headlight, high_level;
-    uint8_t  no_deck, deck;
-    uint32_t revision0;
-    uint16_t revision1;
-    uint8_t  modified;
-    int8_t   selftest_passed;
+    ivl_cf_simulation_t sim;
+    uint8_t             controller, estimator;
+    uint8_t             bypass;  ///< motorPowerSet.enable
+    uint16_t            bypass_pwm[4];
+    uint8_t             alt_hold, pos_hold, pos_set, stab_roll, stab_pitch, stab_yaw, yaw_mode;
+    uint8_t             group_mask;  ///< of the high-level commander
+    float               takeoff_mps, landing_mps;
+    ivl_cf_cppm_t       cppm;
+    float               ext_pos_sigma_m;
+    float               initial_m[3], initial_yaw_rad;  ///< where the estimate begins after a reset
+    uint8_t             reset_estimation, prop_test, battery_test;
+    uint8_t             task_dump, assert_info, storage_stats, tester_reset;
+    uint8_t             high_level;
+    uint8_t             has_flow_deck, has_ranger_deck;
+    float               low_V;
+    uint32_t            cpu_id[3];
+    int8_t              selftest_passed;
 } ivl_cf_settings_t;
+
+/// Where distance sensors look, in body axes.
+typedef enum
+{
+    IVL_CF_FRONT,
+    IVL_CF_BACK,
+    IVL_CF_LEFT,
+    IVL_CF_RIGHT,
+    IVL_CF_UP,
+    IVL_CF_DOWN,
+    IVL_CF_DIRECTIONS
+} ivl_cf_direction_t;
+
+/// Types of the list of names.
+typedef uint8_t  ivl_cf_ctype_U8;
+typedef uint16_t ivl_cf_ctype_U16;
+typedef uint32_t ivl_cf_ctype_U32;
+typedef int8_t   ivl_cf_ctype_I8;
+typedef int16_t  ivl_cf_ctype_I16;
+typedef int32_t  ivl_cf_ctype_I32;
+typedef float    ivl_cf_ctype_F32;
+typedef double   ivl_cf_ctype_F64;
+
+#define IVL_CF_NOTHING(...)
+#define IVL_CF_MEMBER(type_, group_, name_, access, value) ivl_cf_ctype_##type_ group_##_##name_;
+
+/// Values of the parameters that are held.
+typedef struct
+{
+    IVL_CF_PARAMS(IVL_CF_NOTHING, IVL_CF_MEMBER)
+} ivl_cf_held_t;
 
 /// Landings.
 typedef struct
@@ -61,6 +114,7 @@ typedef struct
 struct ivl_cf
 {
     bool                is_open;
+    bool                is_on;  ///< its processor has power
     ivl_sim_model_t     model;
     ivl_sim_group_t     group;
     uint64_t            seed;
@@ -73,11 +127,13 @@ struct ivl_cf
     bool                runs_stock;  ///< the stock controller is selected
     uint64_t            app_wake_ms;
     ivl_cf_settings_t   set;
+    ivl_cf_held_t       held;
     ivl_cf_supervisor_t supervisor;
     ivl_cf_commander_t  commander;
     ivl_cf_planner_t    planner;
     ivl_cf_stock_t      stock;
     ivl_cf_estimate_t   estimate;
+    ivl_cf_frame_t      frame;  ///< of the estimate, if it is not the world's
     ivl_cf_power_t      power;
     ivl_cf_episode_t    episode;
     ivl_in_t            sensed;  ///< of the last tick, in vehicle time
@@ -90,8 +146,13 @@ struct ivl_cf
     float               acc_g[3];    ///< filtered
     float               motor_N[4];  ///< commands of the last tick
     float               variance_m2;
-    bool                has_range;    ///< the world has a ranging sensor
-    uint16_t            range_up_mm;  ///< its last reading, or what one would say
+    bool                has_range;                         ///< the world has a ranging sensor
+    uint16_t            range_mm[IVL_CF_DIRECTIONS];       ///< last readings
+    uint16_t            range_next_mm[IVL_CF_DIRECTIONS];  ///< measured, not yet told
+    int16_t             flow_pixels[2];                    ///< deltaX, deltaY of the flow sensor
+    uint8_t             eeprom[IVL_CF_EEPROM_BYTES];
+    uint8_t             one_wire[IVL_CF_DECKS][IVL_CF_ONE_WIRE_BYTES];  ///< of the decks that are on
+    uint32_t            tester_errors;  ///< bytes written to the memory tester that were not those it expects
     ivl_cf_text_t       text;
     ivl_cf_packets_t    to_app, from_app;
     size_t              changed[IVL_CF_CHANGED_MAX];
@@ -112,6 +173,9 @@ static inline ivl_sim_world_t *ivl_cf_world(ivl_cf_t *cf)
 }
 
 // ---- cf_senses.c
+
+/// The estimator begins anew: at kalman.initial*, if they are not all 0, else where the vehicle is.
+void ivl_cf_begin_estimate(ivl_cf_t *cf);
 
 /// Sensors and estimator have a tick of the world.
 void ivl_cf_sense(ivl_cf_t *cf, const ivl_in_t *in);
@@ -135,6 +199,23 @@ void ivl_cf_world_tick(ivl_cf_t *cf);
 /// Hovering at the start point, armed, in flight.
 void ivl_cf_world_reset(ivl_cf_t *cf);
 
+/// Taken by hand from wherever it is, and put down upright on the floor below, its heading kept; what it flew is over.
+void ivl_cf_world_place(ivl_cf_t *cf);
+
+// ---- cf_decks.c
+
+/// Nothing has been measured yet.
+void ivl_cf_decks_boot(ivl_cf_t *cf);
+
+/// What is measured on the decks, a millisecond after the one before.
+void ivl_cf_decks_step(ivl_cf_t *cf);
+bool ivl_cf_has_deck(const ivl_cf_t *cf, size_t deck);
+
+// ---- cf_memories.c
+
+/// As it comes from the factory, with the last byte of the radio address.
+void ivl_cf_eeprom_init(ivl_cf_t *cf, uint8_t address);
+
 // ---- cf_episode.c
 
 /// After a tick in which the app has begun an approach.
@@ -156,6 +237,9 @@ void              ivl_cf_relax(ivl_cf_t *cf);
 
 /// Builds the tables.  @return false if they do not hold what the app brings
 bool ivl_cf_tables_open(ivl_cf_t *cf);
+
+/// Held parameters have their first values.
+void ivl_cf_tables_boot(ivl_cf_t *cf);
 
 /// The vehicle has changed a parameter of its own.
 void ivl_cf_param_changed(ivl_cf_t *cf, const void *address);

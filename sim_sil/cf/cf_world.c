@@ -1,5 +1,6 @@
 /// @file cf_world.c
 /// The world between landings: a floor to start from and to come down to, and the way back to the start point.
+#include <math.h>
 #include <string.h>
 
 #include "app_convert.h"
@@ -10,6 +11,27 @@ static const double FLOOR_Z_M = 0.0;
 // of the generator's streams, those that no landing is likely to ask for
 static const uint64_t STREAM_BETWEEN = 0xFFFFFFFF00000000u;
 
+// No floor and no set of legs is level: half of what a vehicle at rest is tilted by, at least and at most, about both axes.
+static const double HALF_TILT_RAD[2] = {0.001, 0.004};
+
+static double half_tilt(const ivl_cf_t *cf, uint32_t axis)
+{
+    const ivl_sim_rng_t rng = {cf->seed, STREAM_BETWEEN};
+    const double        share = 2.0 * ivl_sim_uniform(&rng, IVL_SIM_DRAW_START_ATTITUDE, axis) - 1.0;
+    const double        size = HALF_TILT_RAD[0] + (HALF_TILT_RAD[1] - HALF_TILT_RAD[0]) * ((share < 0.0) ? -share : share);
+    return (share < 0.0) ? -size : size;
+}
+
+/// q, then a small turn about b_x and b_y.
+static void tilt(const ivl_cf_t *cf, const double q[4], double out[4])
+{
+    const double x = half_tilt(cf, 0), y = half_tilt(cf, 1), n = 1.0 / sqrt(1.0 + x * x + y * y);
+    out[0] = n * (q[0] + q[3] * x - q[2] * y);
+    out[1] = n * (q[1] + q[3] * y + q[2] * x);
+    out[2] = n * (q[2] + q[0] * y - q[1] * x);
+    out[3] = n * (q[3] - q[0] * x - q[1] * y);
+}
+
 static void place_on_floor(ivl_cf_t *cf, double x_m, double y_m, const double q_WB[4])
 {
     ivl_sim_kin_t kin;
@@ -17,7 +39,7 @@ static void place_on_floor(ivl_cf_t *cf, double x_m, double y_m, const double q_
     kin.p_WB_m[0] = x_m;
     kin.p_WB_m[1] = y_m;
     kin.p_WB_m[2] = FLOOR_Z_M;
-    memcpy(kin.q_WB, q_WB, sizeof kin.q_WB);
+    tilt(cf, q_WB, kin.q_WB);
     ivl_sim_world_rest_legs(&cf->model, &kin);
     ivl_sim_world_place(&cf->group, IVL_CF_LANE, &kin);
     cf->grounded = true;
@@ -25,7 +47,7 @@ static void place_on_floor(ivl_cf_t *cf, double x_m, double y_m, const double q_
 
 static void start(ivl_cf_t *cf, double z_m)
 {
-    const double        p[3] = {(double)cf->set.start_x_m, (double)cf->set.start_y_m, z_m}, v[3] = {0.0, 0.0, 0.0};
+    const double        p[3] = {(double)cf->set.sim.start_x_m, (double)cf->set.sim.start_y_m, z_m}, v[3] = {0.0, 0.0, 0.0};
     const ivl_sim_rng_t rng = {cf->seed, STREAM_BETWEEN + cf->n_reset++};
     cf->zero_us = (cf->t_ms / cf->tick_ms + 1) * cf->tick_ms * 1000u;
     cf->grounded = false;
@@ -36,24 +58,26 @@ void ivl_cf_world_boot(ivl_cf_t *cf)
 {
     const double level[4] = {0.0, 0.0, 0.0, 1.0};
     start(cf, FLOOR_Z_M);
-    place_on_floor(cf, (double)cf->set.start_x_m, (double)cf->set.start_y_m, level);
+    place_on_floor(cf, (double)cf->set.sim.start_x_m, (double)cf->set.sim.start_y_m, level);
     memset(ivl_cf_world(cf)->rotor.speed_radps, 0, sizeof ivl_cf_world(cf)->rotor.speed_radps);
 }
 
 void ivl_cf_world_reset(ivl_cf_t *cf)
 {
     const uint32_t   now_ms = ivl_cf_now_ms(cf);
-    const ivl_vec3_t p = {cf->set.start_x_m, cf->set.start_y_m, cf->set.start_z_m};
+    const ivl_vec3_t p = {cf->set.sim.start_x_m, cf->set.sim.start_y_m, cf->set.sim.start_z_m};
     cf->episode.running = false;
     cf->episode.ended = 0;
-    start(cf, (double)cf->set.start_z_m);
+    start(cf, (double)cf->set.sim.start_z_m);
     ivl_cf_supervisor_fly(&cf->supervisor, now_ms);
     ivl_cf_planner_hover(&cf->planner, p, 0.0f, now_ms);
     ivl_cf_commander_init(&cf->commander);
-    const ivl_cf_setpoint_t hover = ivl_cf_planner_next(&cf->planner, now_ms);
+    ivl_cf_setpoint_t hover;
+    (void)ivl_cf_planner_next(&cf->planner, now_ms, &hover);
     (void)ivl_cf_commander_set(&cf->commander, &hover, IVL_CF_PRIORITY_HIGH_LEVEL, now_ms);
     ivl_cf_stock_reset(&cf->stock);
     ivl_cf_estimate_reset(&cf->estimate);
+    cf->frame = (ivl_cf_frame_t){.is_other = false};
     ivl_cf_power_full(&cf->power);
     cf->acc_g[0] = cf->acc_g[1] = 0.0f;
     cf->acc_g[2] = (float)cf->model.raw.world_gravity_mps2 / APP_MPS2_PER_G;
@@ -63,6 +87,24 @@ void ivl_cf_world_reset(ivl_cf_t *cf)
     {
         cf->motor_N[i] = hover_N;
     }
+}
+
+void ivl_cf_world_place(ivl_cf_t *cf)
+{
+    const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
+    const ivl_rot_t     R = ivl_rot_from_quat(kin.q_WB);
+    double              s, c;
+    ivl_sim_sincos(0.5 * ivl_sim_atan2(R.row[1].x, R.row[0].x), &s, &c);
+    const double level[4] = {0.0, 0.0, s, c};
+    cf->episode.running = false;
+    cf->episode.ended = 0;
+    start(cf, FLOOR_Z_M);
+    place_on_floor(cf, kin.p_WB_m[0], kin.p_WB_m[1], level);
+    memset(ivl_cf_world(cf)->rotor.speed_radps, 0, sizeof ivl_cf_world(cf)->rotor.speed_radps);
+    (void)ivl_cf_supervisor_arm(&cf->supervisor, false);
+    ivl_cf_planner_stop(&cf->planner);
+    ivl_cf_commander_relax(&cf->commander);
+    ivl_cf_stock_reset(&cf->stock);
 }
 
 // ---- motion
@@ -118,7 +160,7 @@ static void find_floor(ivl_cf_t *cf)
     }
     if (ivl_sim_world_diverged(&cf->group.state, IVL_CF_LANE) || ivl_cf_world(cf)->gave_up)
     {
-        place_on_floor(cf, (double)cf->set.start_x_m, (double)cf->set.start_y_m, level);
+        place_on_floor(cf, (double)cf->set.sim.start_x_m, (double)cf->set.sim.start_y_m, level);
     }
     else if (cf->group.state.p_WB_m.z[IVL_CF_LANE] <= FLOOR_Z_M && cf->group.state.v_WB_mps.z[IVL_CF_LANE] < 0.0)
     {

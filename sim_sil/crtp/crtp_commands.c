@@ -59,6 +59,24 @@ static bool set_manual(ivl_cf_t *cf, ivl_crtp_reader_t *r)
     return ivl_crtp_exact(r) && ivl_cf_set_manual(cf, v[0], v[1], v[2], thrust, rate);
 }
 
+// channels of a radio control, and up to ten more, of which the first switches levelling
+static bool set_cppm(ivl_cf_t *cf, ivl_crtp_reader_t *r)
+{
+    const uint8_t n_more = ivl_crtp_u8(r) & 0x0Fu;
+    uint16_t      pulse_us[4];
+    for (int i = 0; i < 4; i++)
+    {
+        pulse_us[i] = ivl_crtp_u16(r);
+    }
+    bool level = true;
+    for (uint8_t i = 0; i < n_more; i++)
+    {
+        const uint16_t more_us = ivl_crtp_u16(r);
+        level = level && ((i > 0u) || (more_us >= 1500u));
+    }
+    return ivl_crtp_exact(r) && (n_more <= 10u) && ivl_cf_set_cppm(cf, pulse_us, level);
+}
+
 // the older numbers of three kinds have the yaw rate with the other sign
 static bool set_four(ivl_cf_t *cf, uint8_t type, ivl_crtp_reader_t *r)
 {
@@ -74,6 +92,8 @@ static bool set_four(ivl_cf_t *cf, uint8_t type, ivl_crtp_reader_t *r)
         return ivl_cf_set_velocity(cf, v, -v[3]);
     case 2:
         return ivl_cf_set_zdistance(cf, v[0], v[1], -v[2], v[3]);
+    case 4:
+        return ivl_cf_set_althold(cf, v[0], v[1], v[2], v[3]);
     case 5:
         return ivl_cf_set_hover(cf, v[0], v[1], -v[2], v[3]);
     case 7:
@@ -96,6 +116,8 @@ static bool set_generic(ivl_cf_t *cf, ivl_crtp_reader_t *r)
     {
     case 0:
         return ivl_crtp_exact(r) && ivl_cf_set_stop(cf);
+    case 3:
+        return set_cppm(cf, r);
     case 6:
         return set_full_state(cf, r);
     case 11:
@@ -136,52 +158,74 @@ void ivl_crtp_generic_handle(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet)
 
 typedef struct
 {
-    bool    known, exact;
-    uint8_t group_mask;
-    bool    flag[2];
+    uint8_t id;
+    bool    flag[3];
     float   v[5];
 } high_level_t;
 
-// COMMAND, bytes behind the group mask, then floats; take-off and land have their flag between the floats
-static const struct
-{
-    uint8_t n_flags, n_values;
-    bool    known;
-} HIGH_LEVEL[] = {
-    [1] = {0, 2, true},   // takeoff: height, duration
-    [2] = {0, 2, true},   // land
-    [3] = {0, 0, true},   // stop
-    [4] = {1, 5, true},   // go_to: relative, x y z yaw duration
-    [7] = {1, 3, true},   // takeoff2: height, yaw, use current yaw, duration
-    [8] = {1, 3, true},   // land2
-    [12] = {2, 5, true},  // go_to2: relative, linear, x y z yaw duration
+// What follows the command and the groups: f float, b flag, u number of a trajectory.  NULL: not known, or read by itself.
+static const char *const HIGH_LEVEL[] = {
+    [1] = "ff",        // takeoff: height, duration
+    [2] = "ff",        // land
+    [3] = "",          // stop
+    [4] = "bfffff",    // go_to: relative, x y z yaw duration
+    [5] = "bbuf",      // start_trajectory: relative, reversed, number, time scale
+    [7] = "ffbf",      // takeoff2: height, yaw, use current yaw, duration
+    [8] = "ffbf",      // land2
+    [9] = "fbfbf",     // takeoff_with_velocity: height, relative, yaw, use current yaw, speed
+    [10] = "fbfbf",    // land_with_velocity
+    [11] = "bbfffff",  // spiral: sideways, clockwise, angle, radii, climb, duration
+    [12] = "bbfffff",  // go_to2: relative, linear, x y z yaw duration
+    [13] = "bbbuf",    // start_trajectory2: relative position, relative yaw, reversed, number, time scale
 };
 
-static high_level_t read_high_level(uint8_t command, ivl_crtp_reader_t *r)
+enum
 {
-    high_level_t h = {.known = (command < sizeof HIGH_LEVEL / sizeof HIGH_LEVEL[0]) && HIGH_LEVEL[command].known};
-    if (!h.known)
+    SET_GROUP = 0,
+    DEFINE_TRAJECTORY = 6
+};
+
+static high_level_t read_high_level(const char *form, ivl_crtp_reader_t *r)
+{
+    high_level_t h = {.id = 0};
+    unsigned     n_flags = 0, n_values = 0;
+    for (; *form != '\0'; form++)
     {
-        return h;
-    }
-    const bool is_vertical = (command == 7u) || (command == 8u);
-    h.group_mask = ivl_crtp_u8(r);
-    if (is_vertical)
-    {
-        floats(r, h.v, 2);
-        h.flag[0] = ivl_crtp_u8(r) != 0u;
-        floats(r, h.v + 2, 1);
-    }
-    else
-    {
-        for (int i = 0; i < HIGH_LEVEL[command].n_flags; i++)
+        if (*form == 'f')
         {
-            h.flag[i] = ivl_crtp_u8(r) != 0u;
+            h.v[n_values++] = ivl_crtp_f32(r);
         }
-        floats(r, h.v, HIGH_LEVEL[command].n_values);
+        else if (*form == 'b')
+        {
+            h.flag[n_flags++] = ivl_crtp_u8(r) != 0u;
+        }
+        else
+        {
+            h.id = ivl_crtp_u8(r);
+        }
     }
-    h.exact = ivl_crtp_exact(r);
     return h;
+}
+
+static int start_trajectory(ivl_cf_t *cf, const high_level_t *h, bool has_yaw)
+{
+    const ivl_cf_start_t how = {.relative_position = h->flag[0],
+                                .relative_yaw = has_yaw && h->flag[1],
+                                .reversed = has_yaw ? h->flag[2] : h->flag[1],
+                                .timescale = h->v[0]};
+    return ivl_cf_hl_start(cf, h->id, &how);
+}
+
+static int spiral(ivl_cf_t *cf, const high_level_t *h)
+{
+    const ivl_cf_spiral_t asked = {.sideways = h->flag[0],
+                                   .clockwise = h->flag[1],
+                                   .phi_rad = h->v[0],
+                                   .r0_m = h->v[1],
+                                   .r1_m = h->v[2],
+                                   .climb_m = h->v[3],
+                                   .duration_s = h->v[4]};
+    return ivl_cf_hl_spiral(cf, &asked);
 }
 
 static int do_high_level(ivl_cf_t *cf, uint8_t command, const high_level_t *h)
@@ -196,36 +240,70 @@ static int do_high_level(ivl_cf_t *cf, uint8_t command, const high_level_t *h)
         return ivl_cf_hl_stop(cf);
     case 4:
         return ivl_cf_hl_go_to(cf, h->flag[0], false, h->v, h->v[3], h->v[4]);
+    case 5:
+        return start_trajectory(cf, h, false);
     case 7:
         return ivl_cf_hl_takeoff(cf, h->v[0], h->v[1], h->flag[0], h->v[2]);
     case 8:
         return ivl_cf_hl_land(cf, h->v[0], h->v[1], h->flag[0], h->v[2]);
+    case 9:
+        return ivl_cf_hl_takeoff_at(cf, h->v[0], h->flag[0], h->v[1], h->flag[1], h->v[2]);
+    case 10:
+        return ivl_cf_hl_land_at(cf, h->v[0], h->flag[0], h->v[1], h->flag[1], h->v[2]);
+    case 11:
+        return spiral(cf, h);
     case 12:
         return ivl_cf_hl_go_to(cf, h->flag[0], h->flag[1], h->v, h->v[3], h->v[4]);
+    case 13:
+        return start_trajectory(cf, h, true);
     default:
         return IVL_CRTP_ENOEXEC;
     }
 }
 
-static int high_level(ivl_crtp_t *crtp, uint8_t command, ivl_crtp_reader_t *r)
+static int define_trajectory(ivl_cf_t *cf, ivl_crtp_reader_t *r)
 {
-    if (command == 0u)
-    {
-        const uint8_t mask = ivl_crtp_u8(r);
-        crtp->group_mask = ivl_crtp_exact(r) ? mask : crtp->group_mask;
-        return ivl_crtp_exact(r) ? IVL_CRTP_OK : IVL_CRTP_EINVAL;
-    }
-    const high_level_t h = read_high_level(command, r);
-    if (!h.known)
-    {
-        return IVL_CRTP_ENOEXEC;
-    }
-    if (!h.exact)
+    const uint8_t       id = ivl_crtp_u8(r);
+    ivl_cf_definition_t definition;
+    definition.location = ivl_crtp_u8(r);
+    definition.type = ivl_crtp_u8(r);
+    definition.offset = ivl_crtp_u32(r);
+    definition.n_pieces = ivl_crtp_u8(r);
+    return ivl_crtp_exact(r) ? ivl_cf_hl_define(cf, id, &definition) : IVL_CRTP_EINVAL;
+}
+
+static int set_group(ivl_cf_t *cf, ivl_crtp_reader_t *r)
+{
+    const uint8_t mask = ivl_crtp_u8(r);
+    if (!ivl_crtp_exact(r))
     {
         return IVL_CRTP_EINVAL;
     }
-    const bool is_meant = (h.group_mask == 0u) || ((h.group_mask & crtp->group_mask) != 0u);
-    return is_meant ? do_high_level(crtp->cf, command, &h) : IVL_CRTP_OK;
+    ivl_cf_hl_group(cf, mask);
+    return IVL_CRTP_OK;
+}
+
+static int high_level(ivl_crtp_t *crtp, uint8_t command, ivl_crtp_reader_t *r)
+{
+    if (command == SET_GROUP)
+    {
+        return set_group(crtp->cf, r);
+    }
+    if (command == DEFINE_TRAJECTORY)
+    {
+        return define_trajectory(crtp->cf, r);
+    }
+    if ((command >= sizeof HIGH_LEVEL / sizeof HIGH_LEVEL[0]) || (HIGH_LEVEL[command] == NULL))
+    {
+        return IVL_CRTP_ENOEXEC;
+    }
+    const uint8_t      groups = ivl_crtp_u8(r);
+    const high_level_t h = read_high_level(HIGH_LEVEL[command], r);
+    if (!ivl_crtp_exact(r))
+    {
+        return IVL_CRTP_EINVAL;
+    }
+    return ivl_cf_hl_is_meant(crtp->cf, groups) ? do_high_level(crtp->cf, command, &h) : IVL_CRTP_OK;
 }
 
 // the answer is the first three bytes of the request, then the error

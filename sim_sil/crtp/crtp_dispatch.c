@@ -52,6 +52,75 @@ void ivl_crtp_close(ivl_crtp_t *crtp)
 
 // ---- packets
 
+enum
+{
+    ZERO_BYTES = 14,    // of a set-point of port 3
+    CLOSING_MS = 1500,  // from cflib's last set-point to the end of its socket: 1.2 s at most
+    HAND_BACK_MS = 400  // before a set-point is old
+};
+
+static bool is_zero(const ivl_crtp_packet_t *packet)
+{
+    bool zero = (packet->port == IVL_CRTP_PORT_COMMANDER) && (packet->size == ZERO_BYTES);
+    for (size_t i = 0; zero && (i < packet->size); i++)
+    {
+        zero = packet->data[i] == 0u;
+    }
+    return zero;
+}
+
+static void let_zero_act(ivl_crtp_t *crtp)
+{
+    crtp->holds_zero = false;
+    (void)ivl_cf_set_rpyt(crtp->cf, 0.0f, 0.0f, 0.0f, 0);
+    crtp->zero_until_ms = ivl_crtp_time_ms(crtp) + HAND_BACK_MS;
+}
+
+// It is nobody's any more, and would lock the vehicle when it is old.
+static void hand_back(ivl_crtp_t *crtp)
+{
+    crtp->ends_with_zero = false;
+    ivl_cf_notify_stop(crtp->cf, 0);
+}
+
+// cflib ends each connection with a set-point of zeros.  By radio it never leaves; here it arrives, and would take the motors from a vehicle that
+// flies on by itself.  There it waits until the client says something else, or for longer than cflib needs to close.
+static bool is_held_back(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet)
+{
+    if (packet->port == IVL_CRTP_PORT_LINK)
+    {
+        return false;
+    }
+    if (crtp->holds_zero)
+    {
+        let_zero_act(crtp);
+    }
+    const float factor = crtp->own.time.speed_factor;
+    crtp->ends_with_zero = is_zero(packet);
+    crtp->holds_zero = crtp->ends_with_zero && ivl_cf_flies_high_level(crtp->cf);
+    crtp->zero_until_ms = ivl_crtp_time_ms(crtp) + HAND_BACK_MS;
+    if (crtp->holds_zero)
+    {
+        const float wait_ms = (float)CLOSING_MS * ((factor > 1.0f) ? factor : 1.0f);
+        crtp->zero_until_ms = (factor > 0.0f) ? ivl_crtp_time_ms(crtp) + (uint64_t)wait_ms : UINT64_MAX;
+    }
+    return crtp->holds_zero;
+}
+
+static void look_after_zero(ivl_crtp_t *crtp)
+{
+    if (!crtp->ends_with_zero || (ivl_crtp_time_ms(crtp) < crtp->zero_until_ms))
+    {
+        return;
+    }
+    if (crtp->holds_zero)
+    {
+        let_zero_act(crtp);
+        return;
+    }
+    hand_back(crtp);
+}
+
 void ivl_crtp_receive(ivl_crtp_t *crtp, const uint8_t *bytes, size_t size)
 {
     static void (*const HANDLER[IVL_CRTP_PORT_COUNT])(ivl_crtp_t *, const ivl_crtp_packet_t *) = {
@@ -73,7 +142,10 @@ void ivl_crtp_receive(ivl_crtp_t *crtp, const uint8_t *bytes, size_t size)
         ivl_crtp_bad(crtp);
         return;
     }
-    HANDLER[packet.port](crtp, &packet);
+    if (!crtp->is_off && !is_held_back(crtp, &packet))
+    {
+        HANDLER[packet.port](crtp, &packet);
+    }
 }
 
 // ---- time
@@ -134,9 +206,13 @@ static void end_run(ivl_crtp_t *crtp)
 void ivl_crtp_step(ivl_crtp_t *crtp)
 {
     ivl_cf_step(crtp->cf);
-    tell_console(crtp);
-    tell_app(crtp);
-    ivl_crtp_params_step(crtp);
+    look_after_zero(crtp);
+    if (!crtp->is_off)
+    {
+        tell_console(crtp);
+        tell_app(crtp);
+        ivl_crtp_params_step(crtp);
+    }
     ivl_crtp_logs_step(crtp);
     end_run(crtp);
 }
@@ -148,5 +224,10 @@ void ivl_crtp_link(ivl_crtp_t *crtp, bool up)
     {
         ivl_crtp_logs_reset(crtp);
         crtp->is_held = false;
+        if (crtp->ends_with_zero && !crtp->holds_zero)
+        {
+            hand_back(crtp);
+        }
+        crtp->ends_with_zero = crtp->holds_zero = false;
     }
 }

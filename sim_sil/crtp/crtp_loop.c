@@ -7,6 +7,7 @@
 
 #include "crtp_control.h"
 #include "crtp_params.h"
+#include "crtp_power.h"
 #include "crtp_udp.h"
 
 enum
@@ -86,8 +87,21 @@ static void meet_foreigner(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
     }
 }
 
+// The radio's processor acknowledges each of its packets, whoever sends them.
+static void switch_power(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
+{
+    ivl_crtp_packet_t reply;
+    ivl_crtp_power(&loop->crtp, d->bytes, d->size, &reply);
+    send_to(loop, d->peer, &reply);
+}
+
 static void arrive(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
 {
+    if (ivl_crtp_is_power(d->bytes, d->size))
+    {
+        switch_power(loop, d);
+        return;
+    }
     const bool is_null = (d->size > 0u) && ((d->bytes[0] & 0xF3u) == 0xF3u);
     if (is_null && !(loop->session.live && (d->peer == loop->session.peer)))
     {

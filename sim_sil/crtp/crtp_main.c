@@ -12,6 +12,7 @@
 #include <sys/prctl.h>
 #endif
 
+#include "crtp_list.h"
 #include "crtp_loop.h"
 #include "crtp_model_file.h"
 #include "crtp_options.h"
@@ -28,6 +29,9 @@ typedef struct
     int      fd, control_fd;
     uint16_t port, control_port;
 } endpoint_t;
+
+static const unsigned RADIO_ADDRESS = 0xE7;  // last byte of the first vehicle's
+static const char     USUAL_DECK[] = "bcFlow2";
 
 static volatile sig_atomic_t stop;
 
@@ -50,6 +54,11 @@ static void catch_signals(void)
     sigaction(SIGTERM, &action, NULL);
     action.sa_handler = on_child;
     sigaction(SIGCHLD, &action, NULL);
+}
+
+static void ignore(void *context, const ivl_crtp_packet_t *packet)
+{
+    (void)context, (void)packet;
 }
 
 static bool fail(const char *error)
@@ -92,6 +101,52 @@ static void announce(const ivl_crtp_options_t *o, unsigned n, const endpoint_t *
     fflush(stdout);
 }
 
+/// A vehicle with its address, and with the decks that were asked for, or the one that most programs need.
+static ivl_cf_t *make_vehicle(const ivl_crtp_options_t *o, const ivl_sim_model_t *model, unsigned n)
+{
+    char            error[200];
+    ivl_cf_t *const cf = ivl_cf_open(model, o->seed + n, error, sizeof error);
+    if (cf == NULL)
+    {
+        fail(error);
+        return NULL;
+    }
+    ivl_cf_set_address(cf, (uint8_t)(RADIO_ADDRESS + n));
+    for (unsigned i = 0; i < o->n_decks; i++)
+    {
+        (void)ivl_cf_attach(cf, o->deck[i]);  // "none" is no deck
+    }
+    if (o->n_decks == 0u)
+    {
+        (void)ivl_cf_attach(cf, USUAL_DECK);
+    }
+    return cf;
+}
+
+static int show_tables(const ivl_crtp_options_t *o, const ivl_sim_model_t *model)
+{
+    static ivl_crtp_t            server;
+    static const ivl_crtp_host_t HOST = {.send = ignore};
+    char                         error[200];
+    ivl_cf_t *const              cf = make_vehicle(o, model, 0);
+    if (cf == NULL)
+    {
+        return 1;
+    }
+    const bool good = ivl_crtp_open(&server, cf, &HOST, error, sizeof error);
+    if (good)
+    {
+        ivl_crtp_list(&server);
+        ivl_crtp_close(&server);
+    }
+    else
+    {
+        fail(error);
+    }
+    ivl_cf_close(cf);
+    return good ? 0 : 1;
+}
+
 static int fly(const ivl_crtp_options_t *o, const ivl_sim_model_t *model, unsigned n, const endpoint_t *e)
 {
     static ivl_crtp_loop_t    loop;
@@ -99,16 +154,15 @@ static int fly(const ivl_crtp_options_t *o, const ivl_sim_model_t *model, unsign
     const ivl_crtp_loop_cfg_t cfg = {
         .fd = e->fd,
         .control_fd = e->control_fd,
-        .address = (uint8_t)(0xE7u + n),
+        .address = (uint8_t)(RADIO_ADDRESS + n),
         .speed_factor = o->speed_factor,
         .lockstep = o->lockstep,
         .packets_per_s = o->packets_per_s,
         .fault = o->fault,
     };
-    ivl_cf_t *cf = ivl_cf_open(model, o->seed + n, error, sizeof error);
+    ivl_cf_t *const cf = make_vehicle(o, model, n);
     if (cf == NULL)
     {
-        fail(error);
         return 1;
     }
     if (!ivl_crtp_loop_open(&loop, cf, &cfg, error, sizeof error))
@@ -242,6 +296,12 @@ int main(int argc, char **argv)
     {
         fail(error);
         return 2;
+    }
+    if (options.shows_tables)
+    {
+        const int code = show_tables(&options, model);
+        ivl_sil_model_free(model);
+        return code;
     }
     // all ports are taken before the first vehicle starts: all or none
     bool good = true;

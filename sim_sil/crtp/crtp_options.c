@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cf/cf.h"
+
 static const char HELP[] =
     "usage: ivl_sil --model FILE [options]\n"
     "\n"
@@ -18,6 +20,8 @@ static const char HELP[] =
     "  --bind ADDRESS    address to listen on (127.0.0.1: this machine only; 0.0.0.0: everybody who can reach it may fly)\n"
     "  --vehicles N      so many vehicles on consecutive ports, a process each (1 .. 64)\n"
     "  --seed N          of the sensors' noise (0); vehicle n has seed N + n\n"
+    "  --deck NAME       a deck on board, bcFlow2 or bcMultiranger; may be given several times; none: no deck (bcFlow2)\n"
+    "  --tables          print all parameters and log variables, one a line, and stop\n"
     "\n"
     "time\n"
     "  --speed N         N times real time (1)\n"
@@ -107,6 +111,8 @@ typedef enum
     PACKETS,
     FAULT,
     CONTROL,
+    DECK,
+    TABLES,
     OPTION_HELP
 } option_t;
 
@@ -116,6 +122,7 @@ static const struct option OPTIONS[] = {
     {"seed", required_argument, NULL, SEED},   {"speed", required_argument, NULL, SPEED},
     {"lockstep", no_argument, NULL, LOCKSTEP}, {"packets", required_argument, NULL, PACKETS},
     {"fault", required_argument, NULL, FAULT}, {"control", required_argument, NULL, CONTROL},
+    {"deck", required_argument, NULL, DECK},   {"tables", no_argument, NULL, TABLES},
     {"help", no_argument, NULL, OPTION_HELP},  {NULL, 0, NULL, 0},
 };
 
@@ -140,6 +147,20 @@ static bool take_number(int option, const char *text, ivl_crtp_options_t *o)
     }
 }
 
+static bool get_deck(const char *name, ivl_crtp_options_t *o)
+{
+    if (!ivl_cf_is_deck(name) && (strcmp(name, "none") != 0))
+    {
+        return complain("deck", name, "bcFlow2, bcMultiranger or none");
+    }
+    if (o->n_decks == IVL_CRTP_DECKS_MAX)
+    {
+        return complain("deck", name, "8 decks at most");
+    }
+    o->deck[o->n_decks++] = name;
+    return true;
+}
+
 static bool take(int option, ivl_crtp_options_t *o)
 {
     switch (option)
@@ -157,6 +178,11 @@ static bool take(int option, ivl_crtp_options_t *o)
         return get_speed(optarg, &o->speed_factor);
     case FAULT:
         return get_fault(optarg, &o->fault);
+    case DECK:
+        return get_deck(optarg, o);
+    case TABLES:
+        o->shows_tables = true;
+        return true;
     default:
         return take_number(option, optarg, o);
     }

@@ -4,6 +4,11 @@
 #define IVL_CRTP_OPTIONS_H
 #include "crtp_faults.h"
 
+enum
+{
+    IVL_CRTP_DECKS_MAX = 8
+};
+
 typedef struct
 {
     const char          *model, *bind;
@@ -16,6 +21,9 @@ typedef struct
     uint64_t             seed;
     uint32_t             packets_per_s;
     ivl_crtp_fault_cfg_t fault;
+    unsigned             n_decks;
+    const char          *deck[IVL_CRTP_DECKS_MAX];
+    bool                 shows_tables;  ///< print parameters and log variables instead of flying
 } ivl_crtp_options_t;
 
 typedef enum

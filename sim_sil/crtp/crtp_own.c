@@ -41,14 +41,14 @@ size_t ivl_crtp_own_params(ivl_crtp_own_t *own, ivl_cf_param_t *rows)
 size_t ivl_crtp_own_logs(ivl_crtp_own_t *own, ivl_cf_log_t *rows)
 {
     const ivl_cf_log_t own_rows[] = {
-        {"sil", "n_rx", IVL_CF_LOG_U32, &own->n_rx},
-        {"sil", "n_tx", IVL_CF_LOG_U32, &own->n_tx},
-        {"sil", "n_bad", IVL_CF_LOG_U32, &own->n_bad},
-        {"sil", "n_foreign", IVL_CF_LOG_U32, &own->n_foreign},
-        {"sil", "n_slipped", IVL_CF_LOG_U32, &own->time.n_slipped},
-        {"fault", "n_lost", IVL_CF_LOG_U32, &own->n_lost},
-        {"fault", "n_duplicated", IVL_CF_LOG_U32, &own->n_duplicated},
-        {"fault", "n_reordered", IVL_CF_LOG_U32, &own->n_reordered},
+        {.group = "sil", .name = "n_rx", .type = IVL_CF_LOG_U32, .address = &own->n_rx},
+        {.group = "sil", .name = "n_tx", .type = IVL_CF_LOG_U32, .address = &own->n_tx},
+        {.group = "sil", .name = "n_bad", .type = IVL_CF_LOG_U32, .address = &own->n_bad},
+        {.group = "sil", .name = "n_foreign", .type = IVL_CF_LOG_U32, .address = &own->n_foreign},
+        {.group = "sil", .name = "n_slipped", .type = IVL_CF_LOG_U32, .address = &own->time.n_slipped},
+        {.group = "fault", .name = "n_lost", .type = IVL_CF_LOG_U32, .address = &own->n_lost},
+        {.group = "fault", .name = "n_duplicated", .type = IVL_CF_LOG_U32, .address = &own->n_duplicated},
+        {.group = "fault", .name = "n_reordered", .type = IVL_CF_LOG_U32, .address = &own->n_reordered},
     };
     if (rows != NULL)
     {

@@ -67,6 +67,17 @@ void ivl_crtp_params_take_defaults(ivl_crtp_t *crtp)
     }
 }
 
+void ivl_crtp_params_restore(ivl_crtp_t *crtp)
+{
+    for (uint16_t i = 0; i < crtp->params.toc.n; i++)
+    {
+        if (crtp->params.state[i].stored)
+        {
+            (void)ivl_crtp_params_write(crtp, i, crtp->params.state[i].kept);
+        }
+    }
+}
+
 void ivl_crtp_params_close(ivl_crtp_t *crtp)
 {
     free(crtp->params.rows);

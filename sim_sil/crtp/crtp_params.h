@@ -9,6 +9,9 @@ void ivl_crtp_params_close(ivl_crtp_t *crtp);
 
 /// The present values are the defaults; for the program around it, which may set some of the server's own after the opening.
 void ivl_crtp_params_take_defaults(ivl_crtp_t *crtp);
+
+/// Stored values of persistent parameters take effect, as after power-on.
+void ivl_crtp_params_restore(ivl_crtp_t *crtp);
 void ivl_crtp_params_handle(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet);
 void ivl_crtp_params_step(ivl_crtp_t *crtp);
 

@@ -74,8 +74,11 @@ struct ivl_crtp
     ivl_crtp_params_t params;
     ivl_crtp_logs_t   logs;
     ivl_crtp_own_t    own;
-    uint8_t           group_mask;  ///< of the high-level commander
-    uint8_t           address;     ///< last byte of the radio address: who is meant by packed poses
+    uint8_t           address;         ///< last byte of the radio address: who is meant by packed poses
+    bool              is_off;          ///< the vehicle has no power
+    bool              ends_with_zero;  ///< the last command of the client was a set-point of zeros
+    bool              holds_zero;      ///< it waits whether the client stays
+    uint64_t          zero_until_ms;   ///< when it acts all the same, or, having acted, is handed back
     const uint8_t    *phase, *ended;
     uint8_t           last_phase, last_ended;
     bool              is_held;  ///< the answer to run_to_ms waits until it is reached

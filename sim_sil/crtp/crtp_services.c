@@ -6,7 +6,7 @@
 #include "crtp_services.h"
 
 static const char FIRMWARE[] = "inverted landing SIL";
-static const char DEVICE[] = "ivl_sil";
+static const char DEVICE[] = "Crazyflie SIL";
 
 // ---- memory
 
@@ -37,10 +37,9 @@ static void memory_info(ivl_crtp_t *crtp, ivl_crtp_reader_t *r, const ivl_cf_mem
     ivl_crtp_put_u8(&reply, id);
     if (id < n)
     {
-        static const uint8_t NO_ADDRESS[8];
         ivl_crtp_put_u8(&reply, memories[id].type);
         ivl_crtp_put_u32(&reply, memories[id].size());
-        ivl_crtp_put_bytes(&reply, NO_ADDRESS, sizeof NO_ADDRESS);
+        ivl_crtp_put_bytes(&reply, memories[id].serial, sizeof memories[id].serial);
     }
     ivl_crtp_send(crtp, &reply);
 }

@@ -775,7 +775,7 @@ static void test_policy_of_every_form_is_taken_in_parts(void)
         ivl_policy_t      policy = {.id = {.seq = 50u + number, .form = (uint8_t)number}, .n = form->n_params};
         for (uint32_t i = 0; i < policy.n; i++)
         {
-            policy.theta[i] = 0.5f * (form->params[i].lo + form->params[i].hi);
+            policy.theta[i] = 0.5f * (ivl_form_group_of(form, i)->lo + ivl_form_group_of(form, i)->hi);
         }
         policy.id.crc = ivl_policy_crc(&policy);
         TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_check(&ivl_app.cfg, &policy));

@@ -93,6 +93,10 @@ static inline double read_log(const char *group, const char *name)
                 return (double)*(const uint32_t *)l[i].address;
             case IVL_CF_LOG_U16:
                 return (double)*(const uint16_t *)l[i].address;
+            case IVL_CF_LOG_I16:
+                return (double)*(const int16_t *)l[i].address;
+            case IVL_CF_LOG_I32:
+                return (double)*(const int32_t *)l[i].address;
             case IVL_CF_LOG_I8:
                 return (double)*(const int8_t *)l[i].address;
             default:
@@ -169,7 +173,7 @@ static inline ivl_cf_outcome_header_t read_outcome(ivl_sim_outcome_t *outcome)
     size_t                  n;
     ivl_cf_outcome_header_t header;
     const ivl_cf_memory_t  *m = ivl_cf_memories(vehicle, &n);
-    TEST_ASSERT_EQUAL_UINT(3, n);
+    TEST_ASSERT_TRUE(n > 2);
     TEST_ASSERT_EQUAL_UINT8(IVL_CF_MEMORY_OUTCOME, m[1].type);
     TEST_ASSERT_EQUAL_UINT32(sizeof header + sizeof *outcome, m[1].size());
     TEST_ASSERT_TRUE(m[1].read(0, sizeof header, (uint8_t *)&header));

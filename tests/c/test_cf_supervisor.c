@@ -13,7 +13,7 @@ static ivl_cf_supervisor_in_t in;
 static char                   seen[200];  ///< initials of the states passed through
 
 /// One letter a state.
-static const char LETTERS[] = "-npRFLrWXKC";
+static const char LETTERS[] = "-npARFLrWXKC";
 _Static_assert(sizeof LETTERS == IVL_CF_STATE_COUNT + 1, "one letter a state");
 
 static void run(uint32_t ms)
@@ -60,7 +60,7 @@ static void hang(void)
 static void test_boot_arms_by_itself_or_waits_to_be_armed(void)
 {
     run(400);
-    TEST_ASSERT_EQUAL_STRING("npR", seen);
+    TEST_ASSERT_EQUAL_STRING("npAR", seen);
     TEST_ASSERT_TRUE(sup.armed && ivl_cf_supervisor_motors_allowed(&sup));
     setUp();
     sup.auto_arm = 0;
@@ -68,8 +68,8 @@ static void test_boot_arms_by_itself_or_waits_to_be_armed(void)
     TEST_ASSERT_EQUAL_STRING("np", seen);
     TEST_ASSERT_EQUAL_HEX16(0x0001, ivl_cf_supervisor_bits(&sup));
     TEST_ASSERT_TRUE(ivl_cf_supervisor_arm(&sup, true));
-    run(40);
-    TEST_ASSERT_EQUAL_STRING("npR", seen);
+    run(80);
+    TEST_ASSERT_EQUAL_STRING("npAR", seen);
     TEST_ASSERT_EQUAL_HEX16(0x000A, ivl_cf_supervisor_bits(&sup));
 }
 
@@ -144,7 +144,7 @@ static void test_flying_and_tumbled_is_crashed_until_recovered_upright(void)
     TEST_ASSERT_EQUAL_STRING("C", seen);
     TEST_ASSERT_TRUE(ivl_cf_supervisor_recover(&sup));
     run(400);
-    TEST_ASSERT_EQUAL_STRING("CnpR", seen);
+    TEST_ASSERT_EQUAL_STRING("CnpAR", seen);
 }
 
 static void test_hanging_upside_down_is_noticed_within_140_ms_and_a_tilt_within_a_second(void)
@@ -188,7 +188,7 @@ static void test_a_disarm_in_flight_of_a_vehicle_that_arms_itself_flies_again(vo
     fly();
     TEST_ASSERT_TRUE(ivl_cf_supervisor_arm(&sup, false));
     run(400);
-    TEST_ASSERT_EQUAL_STRING("rnpRF", seen);
+    TEST_ASSERT_EQUAL_STRING("rnpARF", seen);
 }
 
 static void test_a_disarm_in_flight_of_a_vehicle_that_then_tumbles_is_neither_crashed_nor_locked(void)
@@ -237,7 +237,7 @@ static void test_motors_at_rest_for_two_seconds_have_landed_and_three_more_reset
     run(2960);
     TEST_ASSERT_EQUAL_STRING("L", seen);
     run(400);
-    TEST_ASSERT_EQUAL_STRING("LrnpR", seen);
+    TEST_ASSERT_EQUAL_STRING("LrnpAR", seen);
 }
 
 static void test_landed_and_tumbled_stays_landed_until_its_time_is_over_and_an_emergency_stop_is_no_trigger_there(void)
@@ -271,7 +271,7 @@ static void test_an_armed_vehicle_that_does_not_take_off_is_disarmed(void)
     run(29900);
     TEST_ASSERT_TRUE(sup.armed);
     run(400);
-    TEST_ASSERT_EQUAL_STRING("npRp", seen);
+    TEST_ASSERT_EQUAL_STRING("npARnp", seen);
     TEST_ASSERT_FALSE(sup.armed);
 }
 
@@ -293,11 +293,79 @@ static void test_recovery_asked_for_in_flight_is_granted_and_changes_nothing(voi
     TEST_ASSERT_EQUAL_STRING("", seen);
 }
 
+// ---- the machine of the stock firmware of August 2026, row by row: state, conditions, next state
+
+/// One letter a condition, from the lowest bit on: armed, flying, tumbled, warned of an old set-point, dead set-point, emergency stop, crashed,
+/// pre-flight time over, landed time over.
+static const char CONDITIONS[] = "aftwdecpl";
+_Static_assert(sizeof CONDITIONS == IVL_CF_COND_COUNT + 1, "one letter a condition");
+
+static const char *const ROWS[] = {
+    "- >n",    "n >p",   "nt>n",     "ne>X",    "nte>X",    "na>p",   "p >p",  "pa>A",  "pt>n",    "pat>n",   "pe>X",    "pate>X", "pf>p",
+    "A >n",    "Aa>R",   "Aat>n",    "Aae>X",   "Aafwd>R",  "R >n",   "Ra>R",  "Raf>F", "Rat>n",   "Raft>n",  "Rap>n",   "Rafp>n", "Rf>n",
+    "Rae>X",   "Rate>X", "Raw>R",    "Raf>F",   "F >r",     "Fa>L",   "Faf>F", "Ff>r",  "Faft>C",  "Fft>C",   "Fafw>W",  "Faw>W",  "Fw>r",
+    "Fafwd>X", "Fd>X",   "Fafe>X",   "Fafte>X", "Faftwd>X", "L >r",   "La>L",  "Lf>r",  "Laf>F",   "Lal>r",   "Lafl>r",  "Lae>L",  "Lat>L",
+    "Lawd>L",  "r >n",   "rafte>n",  "W >F",    "Waf>F",    "Wafw>W", "Ww>W",  "Wfw>W", "Wafwd>X", "Wafwt>X", "Wafwe>X", "Wafd>X", "X >K",
+    "Xaf>K",   "K >K",   "Kaftec>K", "C >n",    "Cc>C",     "Ct>C",   "Cct>C", "Cce>K", "Ce>n",    "Cte>K",   "Cctwd>C",
+};
+
+static int number_of(const char *letters, char letter)
+{
+    const char *at = strchr(letters, letter);
+    TEST_ASSERT_NOT_NULL(at);
+    return (int)(at - letters);
+}
+
+static void test_every_transition_is_that_of_the_stock_firmware(void)
+{
+    for (size_t i = 0; i < sizeof ROWS / sizeof ROWS[0]; i++)
+    {
+        const char *row = ROWS[i];
+        uint32_t    conditions = 0;
+        const char *at = row + 1;
+        for (; *at != '>'; at++)
+        {
+            conditions |= (*at == ' ') ? 0u : 1u << number_of(CONDITIONS, *at);
+        }
+        const ivl_cf_state_t from = (ivl_cf_state_t)number_of(LETTERS, row[0]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(number_of(LETTERS, at[1]), ivl_cf_supervisor_next(from, conditions), row);
+    }
+}
+
+static void test_a_landed_vehicle_that_is_disarmed_cannot_fly_at_once(void)
+{
+    sup.auto_arm = 0;
+    run(200);
+    TEST_ASSERT_TRUE(ivl_cf_supervisor_arm(&sup, true));
+    run(80);
+    in.motors_run = true;
+    run(80);
+    in.motors_run = false;
+    run(2200);
+    TEST_ASSERT_EQUAL_INT(IVL_CF_STATE_LANDED, sup.state);
+    TEST_ASSERT_TRUE(ivl_cf_supervisor_can_fly(&sup));
+    TEST_ASSERT_TRUE(ivl_cf_supervisor_arm(&sup, false));
+    run(40);
+    TEST_ASSERT_EQUAL_INT(IVL_CF_STATE_RESET, sup.state);
+    TEST_ASSERT_FALSE(ivl_cf_supervisor_can_fly(&sup) || ivl_cf_supervisor_motors_allowed(&sup));
+}
+
+static void test_a_blow_is_a_crash_if_that_check_is_on(void)
+{
+    fly();
+    in.acc_g[0] = 3.0f;
+    run(200);
+    TEST_ASSERT_EQUAL_STRING("", seen);
+    sup.crash_g = 2.0f;
+    run(40);
+    TEST_ASSERT_EQUAL_STRING("C", seen);
+}
+
 static void test_from_every_state_and_all_conditions_the_next_one_exists_and_motors_stop_with_the_armed_bit(void)
 {
     for (int state = 0; state < IVL_CF_STATE_COUNT; state++)
     {
-        for (uint32_t conditions = 0; conditions < 512; conditions++)
+        for (uint32_t conditions = 0; conditions < 1u << IVL_CF_COND_COUNT; conditions++)
         {
             const ivl_cf_state_t next = ivl_cf_supervisor_next((ivl_cf_state_t)state, conditions);
             TEST_ASSERT_TRUE((int)next >= 0 && (int)next < IVL_CF_STATE_COUNT);
@@ -305,7 +373,7 @@ static void test_from_every_state_and_all_conditions_the_next_one_exists_and_mot
             // only from the state before it, and armed, does a vehicle become ready
             if (next == IVL_CF_STATE_READY && state != IVL_CF_STATE_READY)
             {
-                TEST_ASSERT_EQUAL_INT(IVL_CF_STATE_CHECKS_PASSED, state);
+                TEST_ASSERT_EQUAL_INT(IVL_CF_STATE_ARMING, state);
                 TEST_ASSERT_TRUE((conditions & IVL_CF_COND_ARMED) != 0u && (conditions & IVL_CF_COND_TUMBLED) == 0u);
             }
         }
@@ -332,6 +400,9 @@ int main(void)
     RUN_TEST(test_an_armed_vehicle_that_does_not_take_off_is_disarmed);
     RUN_TEST(test_a_crashed_vehicle_that_is_stopped_locks);
     RUN_TEST(test_recovery_asked_for_in_flight_is_granted_and_changes_nothing);
+    RUN_TEST(test_every_transition_is_that_of_the_stock_firmware);
+    RUN_TEST(test_a_landed_vehicle_that_is_disarmed_cannot_fly_at_once);
+    RUN_TEST(test_a_blow_is_a_crash_if_that_check_is_on);
     RUN_TEST(test_from_every_state_and_all_conditions_the_next_one_exists_and_motors_stop_with_the_armed_bit);
     return UNITY_END();
 }

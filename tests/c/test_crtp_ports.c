@@ -1,5 +1,6 @@
 /// @file test_crtp_ports.c
 /// Each packet that moves the vehicle or asks about it: the bytes of the documentation, and every length that is not theirs.
+#include "crtp/crtp_power.h"
 #include "crtp_fixture.h"
 #include "test_ivl_support.h"
 
@@ -77,10 +78,20 @@ static void test_manual_and_full_state(void)
 
 static void test_setpoints_that_nobody_models_are_counted(void)
 {
-    expect_bad("7c030000000000000000");
-    expect_bad("7c040000803f00000040000040400000003f");
+    expect_bad("7c0c0000803f00000040000040400000003f");
     expect_bad("7cff");
     expect_bad("7e00");
+}
+
+static void test_older_setpoints_and_those_of_a_radio_control(void)
+{
+    check_setpoint("7c040000803f00000040000040400000003f", "althold 1 2 3 0.5");
+    // 1000, 1500, 2000 and 1250 us; a first further channel below 1500 us switches levelling off
+    check_setpoint("7c0300e803dc05d007e204", "cppm 1000 1500 2000 1250 1");
+    expect_said("7c0301e803dc05d007e204db05", "cppm 1000 1500 2000 1250 0");
+    expect_said("7c0302e803dc05d007e204dc050000", "cppm 1000 1500 2000 1250 1");
+    expect_bad("7c0301e803dc05d007e204");
+    expect_bad("7c0300e803dc05d007e204db05");
 }
 
 static void test_notify_stop(void)
@@ -109,6 +120,16 @@ static void test_high_level_commands_are_answered_with_three_bytes_and_an_error(
     expect_said("8c0c00 0100 0000803f00000040000040400000003f00004040", "go_to 1 0 (1 2 3) 0.5 3");
     expect_said("8c0c00 0001 0000803f00000040000040400000003f00004040", "go_to 0 1 (1 2 3) 0.5 3");
     TEST_ASSERT_EQUAL_STRING("8c0c000000", sent);
+    expect_said("8c0900 0000803f 01 00000040 00 0000003f", "takeoff_at 1 1 2 0 0.5");
+    expect_said("8c0a00 0000803f 00 00000040 01 0000003f", "land_at 1 0 2 1 0.5");
+    expect_said("8c0b00 0100 0000803f00000040000040400000003f00004040", "spiral 1 0 1 2 3 0.5 3");
+    expect_said("8c0500 0100 07 00000040", "start 7 1 0 0 2");
+    expect_said("8c0500 0001 07 00000040", "start 7 0 0 1 2");
+    expect_said("8c0d00 010001 07 00000040", "start 7 1 0 1 2");
+    expect_said("8c0d00 000100 07 00000040", "start 7 0 1 0 2");
+    // a definition names no groups
+    expect_said("8c06 03 01 00 84000000 05", "define 3 1 0 132 5");
+    TEST_ASSERT_EQUAL_STRING("8c06030100", sent);
 }
 
 static void test_high_level_errors(void)
@@ -119,9 +140,9 @@ static void test_high_level_errors(void)
     expect_answer("8c03", "8c03000016");
     expect_answer("8c030000", "8c03000016");
     expect_answer("8c07000000803f0000004001000040", "8c07000016");
-    // trajectories and spirals are not modelled
-    expect_answer("8c05000000010000803f", "8c05000008");
-    expect_answer("8c0b00", "8c0b000008");
+    expect_answer("8c0b00", "8c0b000016");
+    expect_answer("8c0603010084000000", "8c06030116");
+    expect_answer("8c0e00", "8c0e000008");
     expect_answer("8cff00", "8cff000008");
     expect_bad("8c");
     expect_bad("8d0300");
@@ -134,6 +155,146 @@ static void test_high_level_commands_for_another_group_do_nothing_and_succeed(vo
     TEST_ASSERT_EQUAL_STRING("8c03010000", sent);
     expect_said("8c0303", "hl_stop");
     expect_said("8c0300", "hl_stop");
+}
+
+// ---- the set-point of zeros with which cflib closes
+
+static const char ZERO[] = "3c0000000000000000000000000000";
+
+static void test_zeros_act_at_once_unless_the_vehicle_flies_on_by_itself(void)
+{
+    expect_said(ZERO, "rpyt 0 0 0 0");
+    fake.flies_high_level = true;
+    expect_said(ZERO, "");
+    // pings go on while cflib closes
+    expect_said("fc00", "");
+    expect_said("7c00", "rpyt 0 0 0 0; stop");
+    expect_said(ZERO, "");
+    expect_said(ZERO, "rpyt 0 0 0 0");
+}
+
+static void test_zeros_that_wait_are_dropped_with_their_client_and_act_if_he_stays(void)
+{
+    fake.flies_high_level = true;
+    expect_said(ZERO, "");
+    ivl_crtp_link(&server, false);
+    for (int ms = 0; ms < 3000; ms++)
+    {
+        ivl_crtp_step(&server);
+    }
+    TEST_ASSERT_EQUAL_STRING("link 0", fake_said);
+    expect_said(ZERO, "");
+    for (int ms = 0; ms < 1499; ms++)
+    {
+        ivl_crtp_step(&server);
+    }
+    TEST_ASSERT_EQUAL_STRING("", fake_said);
+    ivl_crtp_step(&server);
+    TEST_ASSERT_EQUAL_STRING("rpyt 0 0 0 0", fake_said);
+}
+
+static void test_zeros_that_nothing_follows_are_handed_back_before_they_are_old(void)
+{
+    expect_said(ZERO, "rpyt 0 0 0 0");
+    for (int ms = 0; ms < 399; ms++)
+    {
+        ivl_crtp_step(&server);
+    }
+    hear("fc00");
+    TEST_ASSERT_EQUAL_STRING("rpyt 0 0 0 0", fake_said);
+    for (int ms = 0; ms < 2000; ms++)
+    {
+        ivl_crtp_step(&server);
+    }
+    TEST_ASSERT_EQUAL_STRING("rpyt 0 0 0 0; notify_stop 0", fake_said);
+    // a stream of them is somebody's
+    for (int i = 0; i < 10; i++)
+    {
+        hear(ZERO);
+        forget();
+        for (int ms = 0; ms < 390; ms++)
+        {
+            ivl_crtp_step(&server);
+        }
+        TEST_ASSERT_EQUAL_STRING("", fake_said);
+    }
+}
+
+static void test_a_client_that_ends_with_zeros_hands_back(void)
+{
+    expect_said(ZERO, "rpyt 0 0 0 0");
+    forget();
+    ivl_crtp_link(&server, false);
+    TEST_ASSERT_EQUAL_STRING("link 0; notify_stop 0", fake_said);
+    expect_said("3c0000803f00000040000040401027", "rpyt 1 2 3 10000");
+    forget();
+    ivl_crtp_link(&server, false);
+    TEST_ASSERT_EQUAL_STRING("link 0", fake_said);
+}
+
+// ---- the radio's processor
+
+static void power(const char *request, const char *said, const char *answer)
+{
+    uint8_t           bytes[64], out[IVL_CRTP_BYTES_MAX];
+    char              hex[80] = "";
+    ivl_crtp_packet_t reply;
+    const size_t      size = from_hex(request, bytes, sizeof bytes);
+    fake_clear();
+    TEST_ASSERT_TRUE_MESSAGE(ivl_crtp_is_power(bytes, size), request);
+    ivl_crtp_power(&server, bytes, size, &reply);
+    const size_t n = ivl_crtp_bytes(&reply, out);
+    for (size_t i = 0; i < n; i++)
+    {
+        (void)snprintf(hex + 2u * i, 3, "%02x", out[i]);
+    }
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(answer, hex, request);
+    TEST_ASSERT_EQUAL_STRING_MESSAGE(said, fake_said, request);
+}
+
+static void test_power_packets_switch_the_vehicle_and_are_always_acknowledged(void)
+{
+    const uint32_t n_bad = server.own.n_bad;
+    power("fffe03", "", "ff");
+    power("fffe02", "link 0; off", "ff");
+    power("f3fe02", "", "ff");
+    // nobody is at home
+    expect_answer("fc00112233", "");
+    fake.console = "unsaid";
+    ivl_crtp_step(&server);
+    TEST_ASSERT_EQUAL_STRING("", sent);
+    fake.console = NULL;
+    expect_said("7c00", "");
+    TEST_ASSERT_EQUAL_STRING("", sent);
+    power("fffe03", "on", "ff");
+    expect_answer("fc00112233", "fc00112233");
+    power("fffe01", "link 0; off", "ff");
+    power("fffe03", "on", "ff");
+    power("fffeff", "", "fffeffe7e7e7e7");
+    TEST_ASSERT_EQUAL_UINT32(n_bad, server.own.n_bad);
+    power("fffef001", "link 0; off; on", "ff");
+    // there is no loader
+    power("fffef000", "", "ff");
+    power("fffef0", "", "ff");
+    power("fffe77", "", "ff");
+    TEST_ASSERT_EQUAL_UINT32(n_bad + 3u, server.own.n_bad);
+    const uint8_t others[][3] = {{0xFF, 0xFF, 2}, {0xFD, 0xFE, 2}, {0xEF, 0xFE, 2}};
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
+    {
+        TEST_ASSERT_FALSE(ivl_crtp_is_power(others[i], 3));
+    }
+    TEST_ASSERT_FALSE(ivl_crtp_is_power((const uint8_t[]){0xFF, 0xFE}, 2));
+}
+
+static void test_stored_values_are_in_force_after_power_on(void)
+{
+    // row 5 is persistent
+    expect_answer("2e05000000803f", "2e05000000803f");
+    hear("2f030500");
+    expect_answer("2e050000000040", "2e050000000040");
+    power("fffe02", "link 0; off", "ff");
+    power("fffe03", "on", "ff");
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, fake_values.kept);
 }
 
 static void test_localization(void)
@@ -244,7 +405,7 @@ static void test_memory(void)
 {
     expect_answer("4c01", "4c0102");
     expect_answer("4c0200", "4c020018280000000000000000000000");
-    expect_answer("4c0201", "4c02011e280000000000000000000000");
+    expect_answer("4c0201", "4c020101280000000102030405060708");
     expect_answer("4c0202", "4c0202");
     expect_answer("4d000100000003", "4d000100000000020304");
     // 40 bytes; a packet carries 24
@@ -319,6 +480,13 @@ int main(void)
     RUN_TEST(test_generic_setpoints);
     RUN_TEST(test_manual_and_full_state);
     RUN_TEST(test_setpoints_that_nobody_models_are_counted);
+    RUN_TEST(test_older_setpoints_and_those_of_a_radio_control);
+    RUN_TEST(test_zeros_act_at_once_unless_the_vehicle_flies_on_by_itself);
+    RUN_TEST(test_zeros_that_wait_are_dropped_with_their_client_and_act_if_he_stays);
+    RUN_TEST(test_zeros_that_nothing_follows_are_handed_back_before_they_are_old);
+    RUN_TEST(test_a_client_that_ends_with_zeros_hands_back);
+    RUN_TEST(test_power_packets_switch_the_vehicle_and_are_always_acknowledged);
+    RUN_TEST(test_stored_values_are_in_force_after_power_on);
     RUN_TEST(test_notify_stop);
     RUN_TEST(test_a_setpoint_that_the_vehicle_refuses_is_counted);
     RUN_TEST(test_high_level_commands_are_answered_with_three_bytes_and_an_error);

@@ -3,8 +3,6 @@
 
 static const float DT_S = 0.002f;
 
-static const ivl_room_t UNKNOWN = {0.0f, 0.0f};
-
 static ivl_cfg_t defaults(void)
 {
     ivl_cfg_t cfg;
@@ -18,7 +16,7 @@ static void test_reference_begins_at_the_present_position_and_speed(void)
     const ivl_vec3_t p = {0.3f, -0.2f, 0.9f};
     ivl_approach_t   approach;
     // velocity component along 60 degrees: 0.5 cos 60 + 1.0 sin 60 = 1.1160
-    ivl_approach_begin(&cfg, &approach, &UNKNOWN, p, ivl_vec3(0.5f, 0.7f, 1.0f), 2.5f, 1.04719755f);
+    ivl_approach_begin(&cfg, &approach, p, ivl_vec3(0.5f, 0.7f, 1.0f), 2.5f, 1.04719755f);
     const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
     TEST_ASSERT_EQUAL_MEMORY(&p, &ref.p_W_m, sizeof p);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, 1.1160254f * 0.5f, ref.v_W_mps.x);
@@ -33,7 +31,7 @@ static void test_path_from_rest_follows_constant_acceleration_then_constant_spee
 {
     const ivl_cfg_t cfg = defaults();
     ivl_approach_t  approach;
-    ivl_approach_begin(&cfg, &approach, &UNKNOWN, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 0.0f), 2.5f, IVL_HALF_PI);
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 0.0f), 2.5f, IVL_HALF_PI);
     const float t_ramp_s = 2.5f / 4.3f;
     const float s_ramp_m = 0.5f * 2.5f * t_ramp_s;
     for (int i = 0; i < 1000; i++)
@@ -55,7 +53,7 @@ static void test_speed_is_exactly_the_target_after_the_ramp(void)
     for (int k = 0; k < 4; k++)
     {
         ivl_approach_t approach;
-        ivl_approach_begin(&cfg, &approach, &UNKNOWN, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(starts[k], 0.0f, 0.0f), 2.5f, 0.0f);
+        ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(starts[k], 0.0f, 0.0f), 2.5f, 0.0f);
         for (int i = 0; i < 500; i++)
         {
             (void)ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
@@ -70,7 +68,7 @@ static void test_vehicle_already_at_speed_just_holds_it(void)
 {
     const ivl_cfg_t cfg = defaults();
     ivl_approach_t  approach;
-    ivl_approach_begin(&cfg, &approach, &UNKNOWN, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 2.5f), 2.5f, IVL_HALF_PI);
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 2.5f), 2.5f, IVL_HALF_PI);
     for (int i = 0; i < 100; i++)
     {
         const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
@@ -88,7 +86,7 @@ static void test_reference_is_consistent_with_its_derivatives_for_random_paths(v
     for (int i = 0; i < 1000; i++)
     {
         ivl_approach_t approach;
-        ivl_approach_begin(&cfg, &approach, &UNKNOWN, rng_vec3(&rng, 1.0f), rng_vec3(&rng, 3.0f), rng_float(&rng, 0.1f, 6.0f),
+        ivl_approach_begin(&cfg, &approach, rng_vec3(&rng, 1.0f), rng_vec3(&rng, 3.0f), rng_float(&rng, 0.1f, 6.0f),
                            rng_float(&rng, 0.0f, IVL_HALF_PI));
         ivl_reference_t a = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
         for (int k = 0; k < 100; k++)
@@ -110,7 +108,7 @@ static void test_an_accelerating_approach_goes_on_beyond_the_commanded_speed_up_
     ivl_cfg_t cfg = defaults();
     cfg.shape = (uint8_t)IVL_SHAPE_ACCELERATE;
     ivl_approach_t approach;
-    ivl_approach_begin(&cfg, &approach, &UNKNOWN, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 0.0f), 2.5f, IVL_HALF_PI);
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, 0.0f), ivl_vec3(0.0f, 0.0f, 0.0f), 2.5f, IVL_HALF_PI);
     for (int i = 0; i < 1000; i++)
     {
         const ivl_reference_t ref = ivl_approach_next(&cfg, &approach, 0.0f, DT_S);
@@ -126,8 +124,7 @@ static void test_holding_rrev_lets_the_speed_fall_with_the_distance_and_ends_at_
     cfg.shape = (uint8_t)IVL_SHAPE_RREV;
     const float    angle = 1.2f, d0_m = 2.0f;
     ivl_approach_t approach;
-    ivl_approach_begin(&cfg, &approach, &UNKNOWN, ivl_vec3(0.0f, 0.0f, -d0_m), ivl_vec3(2.5f * cosf(angle), 0.0f, 2.5f * sinf(angle)), 2.5f,
-                       angle);
+    ivl_approach_begin(&cfg, &approach, ivl_vec3(0.0f, 0.0f, -d0_m), ivl_vec3(2.5f * cosf(angle), 0.0f, 2.5f * sinf(angle)), 2.5f, angle);
     float rrev = 0.0f;
     bool  was_held = false;
     while (approach.p_W_m.z < -0.2f)

@@ -57,8 +57,9 @@ static void test_defaults_are_those_of_the_table(void)
     ivl_cfg_t cfg;
     ivl_cfg_t expected;
     memset(&cfg, 0xa5, sizeof cfg);
-    memset(&expected, 0xa5, sizeof expected);
     ivl_cfg_defaults(&cfg);
+    // what is between the members does not matter
+    expected = cfg;
     for (size_t i = 0; i < N_PARAMS; i++)
     {
         set_param(&expected, &PARAMS[i], PARAMS[i].dflt);

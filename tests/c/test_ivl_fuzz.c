@@ -365,7 +365,7 @@ static void test_random_flights_have_visited_everything(void)
 {
     for (int i = 0; i < (int)IVL_PHASE_COUNT; i++)
     {
-        TEST_ASSERT_TRUE_MESSAGE(n_ticks_in[i] > N_TICKS_ALL / 300u, ivl_phase_name((ivl_phase_t)i));
+        TEST_ASSERT_TRUE_MESSAGE(n_ticks_in[i] > N_TICKS_ALL / 300u, phase_text((ivl_phase_t)i));
     }
     TEST_ASSERT_TRUE(n_triggers > N_FLIGHTS / 6u);
     TEST_ASSERT_TRUE(n_estimated > N_FLIGHTS / 50u);

@@ -31,7 +31,7 @@ static void bring_to(ivl_phase_t phase)
 
 static void assert_rule(ivl_rule_t expected, uint8_t found)
 {
-    TEST_ASSERT_EQUAL_STRING(ivl_guard_name(expected), ivl_guard_name((ivl_rule_t)found));
+    TEST_ASSERT_EQUAL_INT(expected, found);
 }
 
 /// A rule whose condition is a matter of one input: before the trigger it refuses to arm and aborts, later it changes nothing at all.
@@ -91,17 +91,29 @@ static void check_rule_of_arming(ivl_rule_t rule, spoiler_t spoiler)
 
 // ---- the table as such
 
-static void test_rules_have_names_and_an_act(void)
+#ifndef IVL_NO_TEXT
+static void test_rules_have_names(void)
 {
     TEST_ASSERT_EQUAL_STRING("none", ivl_guard_name(IVL_RULE_NONE));
+    TEST_ASSERT_EQUAL_STRING("battery", ivl_guard_name(IVL_RULE_BATTERY));
+    TEST_ASSERT_EQUAL_STRING("no_go", ivl_guard_name(IVL_RULE_NO_GO));
+    TEST_ASSERT_EQUAL_STRING("level_out_time", ivl_guard_name(IVL_RULE_LEVEL_OUT_TIME));
     TEST_ASSERT_EQUAL_STRING("?", ivl_guard_name(IVL_RULE_COUNT));
+    for (int i = 1; i < (int)IVL_RULE_COUNT; i++)
+    {
+        TEST_ASSERT_TRUE(strlen(ivl_guard_name((ivl_rule_t)i)) > 2u);
+    }
+}
+#endif
+
+static void test_rules_have_an_act(void)
+{
     TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act(IVL_RULE_NONE));
     TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act(IVL_RULE_COUNT));
     TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_COUNT, IVL_PHASE_IDLE));
     TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_STATE, IVL_PHASE_COUNT));
     for (int i = 1; i < (int)IVL_RULE_COUNT; i++)
     {
-        TEST_ASSERT_TRUE(strlen(ivl_guard_name((ivl_rule_t)i)) > 2u);
         TEST_ASSERT_TRUE(ivl_guard_act((ivl_rule_t)i) != IVL_ACT_NONE);
     }
 }
@@ -607,7 +619,7 @@ static void test_every_rule_was_tested(void)
 {
     for (int i = 1; i < (int)IVL_RULE_COUNT; i++)
     {
-        TEST_ASSERT_TRUE_MESSAGE(is_tested[i], ivl_guard_name((ivl_rule_t)i));
+        TEST_ASSERT_EQUAL_INT_MESSAGE(i, is_tested[i] ? i : 0, "a rule that no test has tried");
     }
 }
 
@@ -688,7 +700,10 @@ static void test_lock_out_follows_an_abort_that_has_cut_the_motors_and_a_new_cyc
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_rules_have_names_and_an_act);
+#ifndef IVL_NO_TEXT
+    RUN_TEST(test_rules_have_names);
+#endif
+    RUN_TEST(test_rules_have_an_act);
     RUN_TEST(test_no_rule_aborts_a_flip_or_what_follows_it);
     RUN_TEST(test_vitals_that_are_not_given_satisfy_every_rule);
     RUN_TEST(test_rule_config_refuses_to_arm_before_a_configuration_is_in_force);

@@ -14,6 +14,17 @@ enum
     N_STATES = 200000
 };
 
+/// The vehicle's build has no names.
+static const char *rule_text(ivl_rule_t rule)
+{
+#ifdef IVL_NO_TEXT
+    (void)rule;
+    return "rule";
+#else
+    return table_name(rule);
+#endif
+}
+
 /// What the table says, row by row.
 static ivl_rule_t scanned(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 {
@@ -61,11 +72,16 @@ static void random_state(rng_t *rng, ivl_state_t *state, ivl_seen_t *seen)
     state->sense.up_z = seldom(rng) ? -1.0f : 1.0f;
     state->sense.sample.p_WB_m = ivl_vec3(seldom(rng) ? 1000.0f : 0.0f, 0.0f, 1.0f);
     state->sense.sample.v_WB_mps = ivl_vec3(0.0f, seldom(rng) ? 40.0f : 0.0f, 0.0f);
+    state->decision.asked = seldom(rng);
     state->contact.contact = seldom(rng);
     state->contact.hanging = seldom(rng);
     seen->ceiling.valid = !seldom(rng);
     seen->ceiling.d_ceil_m = seldom(rng) ? 0.0f : 1.0f;
     seen->cues.valid = !seldom(rng);
+    seen->cues.rrev_per_s = seldom(rng) ? 0.0f : 1.0f;
+    state->action.flip = rng_below(rng, 2u) == 0u;
+    state->action.go = !seldom(rng);
+    state->decision.made = seldom(rng);
 }
 
 static void test_the_search_finds_what_a_scan_of_all_rows_finds_in_every_phase(void)
@@ -94,21 +110,22 @@ static void test_the_search_finds_what_a_scan_of_all_rows_finds_in_every_phase(v
     {
         for (int rule = 1; rule < (int)IVL_RULE_COUNT; rule++)
         {
-            TEST_ASSERT_EQUAL_INT_MESSAGE(table_applies((ivl_rule_t)rule, (ivl_phase_t)phase), n_found[phase][rule] > 0, ROWS[rule].name);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(table_applies((ivl_rule_t)rule, (ivl_phase_t)phase), n_found[phase][rule] > 0,
+                                          rule_text((ivl_rule_t)rule));
         }
     }
 }
 
-static void test_a_search_begins_with_the_first_row_of_its_phase(void)
+static void test_a_search_looks_at_the_rows_of_its_phase_alone(void)
 {
     for (int phase = 0; phase < (int)IVL_PHASE_COUNT; phase++)
     {
-        int first = 1;
-        while (first < (int)IVL_RULE_COUNT && !table_applies((ivl_rule_t)first, (ivl_phase_t)phase))
+        uint32_t rows = 0u;
+        for (int rule = 1; rule < (int)IVL_RULE_COUNT; rule++)
         {
-            first++;
+            rows |= table_applies((ivl_rule_t)rule, (ivl_phase_t)phase) ? 1u << rule : 0u;
         }
-        TEST_ASSERT_EQUAL_INT_MESSAGE(first, FIRST[phase], ivl_phase_name((ivl_phase_t)phase));
+        TEST_ASSERT_EQUAL_HEX32_MESSAGE(rows, OF_PHASE[phase], phase_text((ivl_phase_t)phase));
     }
 }
 
@@ -123,7 +140,7 @@ static void test_rules_that_refuse_or_speak_of_others_discard_a_flight(void)
         {
             expected = expected || (rule == (int)of_others[i]);
         }
-        TEST_ASSERT_EQUAL_INT_MESSAGE(expected, table_discards((ivl_rule_t)rule), ROWS[rule].name);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(expected, table_discards((ivl_rule_t)rule), rule_text((ivl_rule_t)rule));
     }
     TEST_ASSERT_FALSE(table_discards(IVL_RULE_COUNT));
 }
@@ -140,7 +157,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_the_search_finds_what_a_scan_of_all_rows_finds_in_every_phase);
-    RUN_TEST(test_a_search_begins_with_the_first_row_of_its_phase);
+    RUN_TEST(test_a_search_looks_at_the_rows_of_its_phase_alone);
     RUN_TEST(test_rules_that_refuse_or_speak_of_others_discard_a_flight);
     return UNITY_END();
 }

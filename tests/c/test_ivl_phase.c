@@ -13,6 +13,7 @@ static void tick_to(ivl_phase_t expected)
     assert_output_sane(&fix);
 }
 
+#ifndef IVL_NO_TEXT
 static void test_phases_have_names(void)
 {
     const char *const names[] = {"idle", "ready", "approach", "flip", "coast", "attached", "done", "aborted", "level_out"};
@@ -23,6 +24,7 @@ static void test_phases_have_names(void)
     TEST_ASSERT_EQUAL_STRING("?", ivl_phase_name(IVL_PHASE_COUNT));
     TEST_ASSERT_EQUAL_STRING("?", ivl_phase_name((ivl_phase_t)1000));
 }
+#endif
 
 static void test_each_phase_can_be_reached_and_stays_when_nothing_changes(void)
 {
@@ -355,7 +357,9 @@ static void test_spoiled_inputs_never_trigger_and_end_in_a_safe_phase_from_every
 int main(void)
 {
     UNITY_BEGIN();
+#ifndef IVL_NO_TEXT
     RUN_TEST(test_phases_have_names);
+#endif
     RUN_TEST(test_each_phase_can_be_reached_and_stays_when_nothing_changes);
     RUN_TEST(test_motors_run_in_four_phases_only);
     RUN_TEST(test_request_idle_leads_to_idle_from_every_phase_at_once);

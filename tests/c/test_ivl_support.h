@@ -200,9 +200,20 @@ static inline void assert_motors_off(const fix_t *fix)
     TEST_ASSERT_FALSE(fix->out.motors_on);
 }
 
+// the vehicle's build has no names
+static inline const char *phase_text(ivl_phase_t phase)
+{
+#ifdef IVL_NO_TEXT
+    (void)phase;
+    return "phase";
+#else
+    return ivl_phase_name(phase);
+#endif
+}
+
 static inline void assert_phase(ivl_phase_t expected, const fix_t *fix)
 {
-    TEST_ASSERT_EQUAL_STRING(ivl_phase_name(expected), ivl_phase_name(fix->out.phase));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected, fix->out.phase, phase_text(fix->out.phase));
 }
 
 // ---- spoiled inputs

@@ -58,8 +58,9 @@ static void test_latch_copies_everything_of_the_tick(void)
     const ivl_action_t    action = {.flip = true, .go = true, .moment_Nm = 0.007f};
 
     // When it is latched
-    const ivl_seen_t     seen = {ceiling, cues};
-    const ivl_snapshot_t s = ivl_trigger_snapshot(&sample, &seen, policy, action);
+    const ivl_seen_t seen = {ceiling, cues};
+    ivl_snapshot_t   s;
+    ivl_trigger_snapshot(&s, &sample, &seen, &policy, &action);
 
     // Then the snapshot has all of them
     TEST_ASSERT_EQUAL_UINT64(11, s.t_us);

@@ -90,6 +90,35 @@ void ivl_cf_link(ivl_cf_t *cf, bool up)
     (void)say("link %d", up);
 }
 
+void ivl_cf_power_off(ivl_cf_t *cf)
+{
+    (void)cf;
+    (void)say("off");
+}
+
+void ivl_cf_power_on(ivl_cf_t *cf)
+{
+    (void)cf;
+    (void)say("on");
+}
+
+void ivl_cf_set_address(ivl_cf_t *cf, uint8_t address)
+{
+    (void)cf;
+    (void)say("address %02x", address);
+}
+
+bool ivl_cf_is_deck(const char *name)
+{
+    return strcmp(name, "bcFlow2") == 0;
+}
+
+bool ivl_cf_attach(ivl_cf_t *cf, const char *name)
+{
+    (void)cf;
+    return say("attach %s", name);
+}
+
 static void was_changed(void)
 {
     (void)say("u8 is %d", fake_values.u8);
@@ -115,14 +144,14 @@ const ivl_cf_param_t *ivl_cf_params(const ivl_cf_t *cf, size_t *n)
 const ivl_cf_log_t *ivl_cf_logs(const ivl_cf_t *cf, size_t *n)
 {
     static const ivl_cf_log_t ROWS[FAKE_LOGS] = {
-        [FAKE_L_PHASE] = {"ivl", "phase", IVL_CF_LOG_U8, &fake_values.phase},
-        [FAKE_L_ENDED] = {"sil", "ended", IVL_CF_LOG_U8, &fake_values.ended},
-        [FAKE_L_I8] = {"l", "i8", IVL_CF_LOG_I8, &fake_values.l_i8},
-        [FAKE_L_U16] = {"l", "u16", IVL_CF_LOG_U16, &fake_values.l_u16},
-        [FAKE_L_I32] = {"l", "i32", IVL_CF_LOG_I32, &fake_values.l_i32},
-        [FAKE_L_F32] = {"l", "f32", IVL_CF_LOG_F32, &fake_values.l_f32},
-        [FAKE_L_TIME] = {"l", "t_ms", IVL_CF_LOG_U32, &fake_values.t_ms},
-        [FAKE_L_U8] = {"l", "u8", IVL_CF_LOG_U8, &fake_values.u8},
+        [FAKE_L_PHASE] = {.group = "ivl", .name = "phase", .type = IVL_CF_LOG_U8, .address = &fake_values.phase},
+        [FAKE_L_ENDED] = {.group = "sil", .name = "ended", .type = IVL_CF_LOG_U8, .address = &fake_values.ended},
+        [FAKE_L_I8] = {.group = "l", .name = "i8", .type = IVL_CF_LOG_I8, .address = &fake_values.l_i8},
+        [FAKE_L_U16] = {.group = "l", .name = "u16", .type = IVL_CF_LOG_U16, .address = &fake_values.l_u16},
+        [FAKE_L_I32] = {.group = "l", .name = "i32", .type = IVL_CF_LOG_I32, .address = &fake_values.l_i32},
+        [FAKE_L_F32] = {.group = "l", .name = "f32", .type = IVL_CF_LOG_F32, .address = &fake_values.l_f32},
+        [FAKE_L_TIME] = {.group = "l", .name = "t_ms", .type = IVL_CF_LOG_U32, .address = &fake_values.t_ms},
+        [FAKE_L_U8] = {.group = "l", .name = "u8", .type = IVL_CF_LOG_U8, .address = &fake_values.u8},
     };
     (void)cf;
     *n = FAKE_LOGS;
@@ -165,7 +194,10 @@ static bool memory_write(uint32_t address, uint32_t size, const uint8_t *bytes)
 
 const ivl_cf_memory_t *ivl_cf_memories(const ivl_cf_t *cf, size_t *n)
 {
-    static const ivl_cf_memory_t ROWS[] = {{0x18, memory_size, memory_read, memory_write}, {0x1E, memory_size, memory_read, NULL}};
+    static const ivl_cf_memory_t ROWS[] = {
+        {.type = 0x18, .size = memory_size, .read = memory_read, .write = memory_write},
+        {.type = 0x01, .size = memory_size, .read = memory_read, .serial = {1, 2, 3, 4, 5, 6, 7, 8}},
+    };
     (void)cf;
     *n = sizeof ROWS / sizeof ROWS[0];
     return ROWS;
@@ -202,6 +234,12 @@ size_t ivl_cf_app_take(ivl_cf_t *cf, uint8_t bytes[IVL_CF_APP_BYTES])
 }
 
 // ---- supervisor
+
+bool ivl_cf_flies_high_level(const ivl_cf_t *cf)
+{
+    (void)cf;
+    return fake.flies_high_level;
+}
 
 uint16_t ivl_cf_supervisor_info(const ivl_cf_t *cf)
 {
@@ -281,6 +319,18 @@ bool ivl_cf_set_position(ivl_cf_t *cf, const float p[3], float yaw_deg)
     return say("position " V3 " %g", D(p[0]), D(p[1]), D(p[2]), D(yaw_deg));
 }
 
+bool ivl_cf_set_althold(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawrate_degps, float vz_mps)
+{
+    (void)cf;
+    return say("althold %g %g %g %g", D(roll_deg), D(pitch_deg), D(yawrate_degps), D(vz_mps));
+}
+
+bool ivl_cf_set_cppm(ivl_cf_t *cf, const uint16_t pulse_us[4], bool level)
+{
+    (void)cf;
+    return say("cppm %u %u %u %u %d", pulse_us[0], pulse_us[1], pulse_us[2], pulse_us[3], level);
+}
+
 bool ivl_cf_set_manual(ivl_cf_t *cf, float roll_deg, float pitch_deg, float yawrate_degps, uint16_t thrust, bool rate)
 {
     (void)cf;
@@ -323,6 +373,49 @@ int ivl_cf_hl_go_to(ivl_cf_t *cf, bool relative, bool linear, const float p[3], 
 {
     (void)cf;
     return busy(say("go_to %d %d " V3 " %g %g", relative, linear, D(p[0]), D(p[1]), D(p[2]), D(yaw_rad), D(duration_s)));
+}
+
+void ivl_cf_hl_group(ivl_cf_t *cf, uint8_t mask)
+{
+    (void)cf;
+    fake.group_mask = mask;
+}
+
+bool ivl_cf_hl_is_meant(const ivl_cf_t *cf, uint8_t mask)
+{
+    (void)cf;
+    return mask == 0u || (mask & fake.group_mask) != 0u;
+}
+
+int ivl_cf_hl_takeoff_at(ivl_cf_t *cf, float height_m, bool relative, float yaw_rad, bool use_current_yaw, float speed_mps)
+{
+    (void)cf;
+    return busy(say("takeoff_at %g %d %g %d %g", D(height_m), relative, D(yaw_rad), use_current_yaw, D(speed_mps)));
+}
+
+int ivl_cf_hl_land_at(ivl_cf_t *cf, float height_m, bool relative, float yaw_rad, bool use_current_yaw, float speed_mps)
+{
+    (void)cf;
+    return busy(say("land_at %g %d %g %d %g", D(height_m), relative, D(yaw_rad), use_current_yaw, D(speed_mps)));
+}
+
+int ivl_cf_hl_spiral(ivl_cf_t *cf, const ivl_cf_spiral_t *s)
+{
+    (void)cf;
+    return busy(say("spiral %d %d %g %g %g %g %g", s->sideways, s->clockwise, D(s->phi_rad), D(s->r0_m), D(s->r1_m), D(s->climb_m),
+                    D(s->duration_s)));
+}
+
+int ivl_cf_hl_define(ivl_cf_t *cf, uint8_t id, const ivl_cf_definition_t *d)
+{
+    (void)cf;
+    return busy(say("define %u %u %u %u %u", id, d->location, d->type, (unsigned)d->offset, d->n_pieces));
+}
+
+int ivl_cf_hl_start(ivl_cf_t *cf, uint8_t id, const ivl_cf_start_t *how)
+{
+    (void)cf;
+    return busy(say("start %u %d %d %d %g", id, how->relative_position, how->relative_yaw, how->reversed, D(how->timescale)));
 }
 
 int ivl_cf_hl_stop(ivl_cf_t *cf)

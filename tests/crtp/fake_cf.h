@@ -16,7 +16,9 @@ typedef struct
     const char *console;      ///< text to be told
     uint8_t     app[IVL_CF_APP_BYTES];
     size_t      app_size;  ///< packet to be sent
-    int         changed;   ///< index of a parameter that the vehicle has changed, -1: none
+    bool        flies_high_level;
+    uint8_t     group_mask;
+    int         changed;  ///< index of a parameter that the vehicle has changed, -1: none
     uint8_t     memory[40];
 } fake_cf_t;
 

@@ -5,8 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import policies
 import pytest
 import yaml
+from policies import TASK
 
 from ivl import cli, experiment, forms
 from ivl.errors import ConfigError
@@ -14,7 +16,7 @@ from ivl.outcome import clean, four_leg
 from ivl.policy import assess as judging
 from ivl.policy import file, general, use
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Family, Place, PolicyTask, fly
+from ivl.policy.flying import Family, Place, fly
 from ivl.policy.learn import Progress, learn
 from ivl.policy.region import PLANE, Region, Series
 from ivl.policy.shape import GO, General
@@ -23,9 +25,6 @@ from ivl.sweep import config as sweep_config
 from ivl.task import settings_of
 
 STEEP = Region(speeds_mps=[2.3, 2.7], angles_deg=[75.0, 90.0])
-TASK = PolicyTask(
-    vehicle="habas2021", gear="wide_short", gear_set="as_simulated", estimator="known_height_predicted", start="flown"
-)
 Capture = pytest.CaptureFixture[str]
 
 
@@ -57,19 +56,9 @@ def learned() -> PolicyFile:
     return learn(tiny_experiment())
 
 
-def good_theta() -> list[float]:
-    """Numbers that land in all of the box, and refuse slow approaches."""
-    shape = General("polynomial2")
-    theta = shape.level(5.082, 10.0)
-    theta[shape.threshold] = [5.082, 0.253, 1.408, -0.208, 0.379, -0.922]
-    theta[shape.go_p_min] = 0.5
-    theta[shape.go] = [5.0, 4.0, 8.0] + [0.0] * 7
-    return theta.tolist()
-
-
 @pytest.fixture
 def by_hand() -> PolicyFile:
-    return file.make(General("polynomial2").form, good_theta(), [TASK], None, None)
+    return policies.by_hand()
 
 
 @pytest.fixture

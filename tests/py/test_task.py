@@ -143,11 +143,20 @@ def test_the_software_vehicle_takes_the_same_options(tmp_path: Path) -> None:
     both = []
     for name, arguments in (
         ("a", ["--experiment", ONBOARD]),
-        ("b", ["--gear-set", "as_simulated", "--sensors", "camera50_ranger10", "--estimator", "kalman"]),
+        ("b", ["--vehicle", "habas2021", "--gear-set", "as_simulated", "--sensors", "camera50_ranger10"]),
     ):
+        arguments += ["--estimator", "kalman"]
         assert cli.run(["sil", *arguments, "--write-model", str(tmp_path / name)]) == 0
         both.append((tmp_path / name).read_text())
     assert both[0] == both[1]
+
+
+def test_the_software_vehicle_turns_if_nobody_says_which(tmp_path: Path) -> None:
+    path = tmp_path / "model"
+    for arguments, torque in (([], 1.0), (["--set", "vehicle=habas2021"], 0.0), (["--vehicle", "habas2021"], 0.0)):
+        assert cli.run(["sil", *arguments, "--write-model", str(path)]) == 0
+        values = dict(line.split(" ", 1) for line in path.read_text().splitlines())
+        assert float.fromhex(values["aero.yaw_torque"]) == torque
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import policies
 import pytest
 
 import ivl  # isort: split
 
 from playwright.sync_api import Browser, Page, Request, Route, sync_playwright
 
-from ivl import experiment, report, run
+from ivl import cli, experiment, report, run
 from ivl.landing import LandingSpec
+from ivl.policy import file
 from ivl.sweep import config, folder, plan, store, work
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -92,6 +94,16 @@ def sweep_page(sweep_run: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
+def policy_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a policy, of as few flights as show a landing and a no-go."""
+    folder = tmp_path_factory.mktemp("policy")
+    file.save(policies.by_hand(), folder / "g.yaml")
+    page = folder / "page.html"
+    assert cli.run(["policy", "report", str(folder / "g.yaml"), "--out", str(page), "--approaches", "30"]) == 0
+    return page
+
+
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     assert CHROMIUM.exists(), f"{CHROMIUM} is missing: run the tests by `make test-report`, which installs it"
     with sync_playwright() as playwright:
@@ -143,6 +155,13 @@ class Visit:
 @pytest.fixture(scope="session")
 def learn(browser: Browser, learn_page: Path) -> Iterator[Visit]:
     visit = Visit(browser, learn_page)
+    yield visit
+    visit.page.close()
+
+
+@pytest.fixture(scope="session")
+def policy(browser: Browser, policy_page: Path) -> Iterator[Visit]:
+    visit = Visit(browser, policy_page)
     yield visit
     visit.page.close()
 

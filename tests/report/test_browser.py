@@ -7,7 +7,7 @@ import pytest
 
 import ivl
 from ivl.landing import LandingSpec
-from ivl.plots.campaign import RATE_MAP
+from ivl.plots.spaces import RATE_MAP
 
 Visit = Any  # of conftest.py
 INSIDE = """(path) => {
@@ -202,3 +202,39 @@ def test_nothing_is_asked_of_anybody(learn: Visit, sweep: Visit) -> None:
     assert refused == "refused"
     assert sweep.foreign == []  # the page's own policy stops it before the browser asks
     sweep.complaints.clear()
+
+
+def test_the_page_of_a_policy_shows_its_pictures_and_a_no_go(policy: Visit) -> None:
+    assert policy.complaints == policy.foreign == []
+    assert policy.page.locator("#problem").is_hidden()
+    assert policy.page.locator("#convergence").is_hidden()
+    sizes = policy.page.evaluate("[...document.querySelectorAll('#pictures-list img')].map((i) => i.naturalWidth)")
+    assert len(sizes) == 4
+    assert min(sizes) > 300
+    assert policy.page.locator("#numbers-table tbody tr").count() > 8
+    assert policy.page.locator("#title-a").inner_text() == "landing"
+    assert policy.page.locator("#title-b").inner_text() == "no-go"
+    assert policy.page.locator("#verdict-b").inner_text().startswith("no_go at P ")
+    assert policy.page.locator("#zero").inner_text() == "from the trigger (A), the no-go (B)"
+
+
+def test_a_no_go_is_replayed_from_its_approach_through_its_level_out(policy: Visit) -> None:
+    policy.set_time(-50)
+    before = policy.drawn(1)
+    assert policy.page.locator("#phase-b").inner_text() == "approach"
+    policy.set_time(60)
+    assert policy.page.locator("#phase-b").inner_text() == "level_out"
+    assert policy.drawn(1)["body"] != before["body"]
+    last_ms = float(policy.page.locator("#time").get_attribute("max") or 0)
+    policy.set_time(last_ms)
+    assert policy.page.locator("#phase-b").inner_text() == "level_out"
+    gap = policy.page.evaluate("-report.replay.panes[1].state.pose.p[2]")
+    assert gap > 0.1
+
+
+def test_the_buttons_of_a_policy_s_flights_show_what_the_no_go_spared(policy: Visit) -> None:
+    rows = policy.page.locator("#notable-table tbody tr")
+    assert rows.count() == 3
+    rows.nth(2).locator("button").nth(0).click()
+    assert policy.page.locator("#title-a").inner_text() == "the same approach, had it been flown"
+    assert not policy.page.locator("#verdict-a").inner_text().startswith("no_go")

@@ -11,10 +11,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import policies
 import pytest
 
-from ivl import report
+from ivl import cli, report
 from ivl.errors import ConfigError, StoreError
+from ivl.policy import assess, file
+from ivl.policy.shape import General
 from ivl.report.landings import thinned
 from ivl.report.page import encode
 from ivl.sweep import store
@@ -193,3 +196,57 @@ def test_thinning_keeps_the_number_and_spreads() -> None:
 def test_a_column_reads_back_within_half_a_unit() -> None:
     values = np.array([1.2345, np.nan, -0.0049, 7.0])
     assert decode(encode(values, 0.01)) == pytest.approx(values, abs=0.005001, nan_ok=True)
+
+
+def test_the_page_of_a_policy_has_the_numbers_of_its_assessment(policy_page: Path) -> None:
+    data = carried(policy_page)
+    judged = assess.assess(policies.by_hand(), n_approaches=30)
+    shown = {name: text for name, text, _ in data["policy"]["numbers"]["rows"]}
+    assert judged.go is not None
+    assert shown["box: land"] == f"{100 * judged.box.landed.value:.1f} %"
+    assert shown["plane: land clean"] == f"{100 * judged.plane.clean.value:.1f} %"
+    assert shown["go / no-go: refused"] == f"{100 * judged.go.no_go.value:.1f} %"
+    assert [picture["name"] for picture in data["policy"]["pictures"]] == [
+        "policy_surface", "policy_rates", "policy_flow_space", "policy_go",
+    ]  # fmt: skip
+
+
+def test_the_flights_of_a_policy_are_flown_as_the_page_says(policy_page: Path) -> None:
+    data = carried(policy_page)
+    landing, no_go, spared = data["landings"]
+    assert landing["outcome"]["four_leg"]
+    assert landing["outcome"]["t_no_go_s"] is None
+    assert (no_go["outcome"]["no_go"], no_go["outcome"]["n_legs"], no_go["outcome"]["t_trigger_s"]) == (1, 0, None)
+    assert "level_out" in [name for _, name in no_go["phases"]]
+    assert no_go["outcome"]["t_no_go_s"] in [t for t, _ in no_go["phases"]]
+    assert no_go["outcome"]["verdict"].startswith("no_go at P ")
+    assert spared["spec"]["theta"] != no_go["spec"]["theta"]
+    assert all(spared["spec"][n] == no_go["spec"][n] for n in ("speed_mps", "angle_deg", "seed", "stream"))
+    assert spared["outcome"]["no_go"] == 0
+    assert ["Landings to replay", "3, flown again, each as recorded"] in data["facts"]
+
+
+def test_the_page_of_a_policy_refers_to_nothing_and_is_small(policy_page: Path) -> None:
+    text = policy_page.read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="(?!data:)', text)
+    assert policy_page.stat().st_size < 2_000_000
+
+
+def test_a_page_of_a_policy_that_cannot_be_written_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file.save(policies.by_hand(), tmp_path / "g.yaml")
+    assert cli.run(["policy", "report", str(tmp_path / "g.yaml"), "--out", str(tmp_path / "no" / "p.html")]) == 2
+    assert "there is no folder" in capsys.readouterr().err
+    assert (
+        cli.run(["policy", "report", str(tmp_path / "g.yaml"), "--out", str(tmp_path / "p.html"), "--rrev", "4"]) == 2
+    )
+    assert "--moment is missing" in capsys.readouterr().err
+
+
+def test_a_policy_that_refuses_nothing_has_a_page_without_a_no_go(tmp_path: Path) -> None:
+    theta = General("polynomial2").always_go(policies.good_theta())
+    file.save(file.make(General("polynomial2").form, theta, [policies.TASK], None, None), tmp_path / "g.yaml")
+    page = tmp_path / "page.html"
+    assert cli.run(["policy", "report", str(tmp_path / "g.yaml"), "--out", str(page), "--approaches", "6"]) == 0
+    data = carried(page)
+    assert [entry["what"] for entry in data["policy"]["notable"]] == ["landing"]
+    assert data["landings"][0]["outcome"]["four_leg"]

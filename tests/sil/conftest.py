@@ -113,7 +113,7 @@ class Raw:
         assert self.ask("5d05") == bytes.fromhex("5d050000")
         n_logs, *_ = struct.unpack("<HIBB", self.ask("5c03")[2:])
         assert len(self.ask(b"\x5c\x02" + struct.pack("<H", n_logs - 1))) > 6
-        assert self.ask("4c01")[2] == 3
+        assert self.ask("4c01")[2] >= 7
         assert len(self.ask("4c0201")) == 16
         n_params, _ = struct.unpack("<HI", self.ask("2c03")[2:])
         assert len(self.ask(b"\x2c\x02" + struct.pack("<H", n_params - 1))) > 6

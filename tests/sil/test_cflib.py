@@ -247,7 +247,7 @@ def test_emergency_stop_locks_the_vehicle(sil, connected, wait_for):
 def test_memories_are_read(sil, connected, wait_for):
     with connected(sil.uri) as cf:
         types = {memory.type: memory for memory in cf.mem.mems}
-        assert set(types) == {0x18, 0x1E, 0x1F}
+        assert set(types) == {0x00, 0x01, 0x12, 0x15, 0x18, 0x19, 0x1E, 0x1F}
         done: list[bytes] = []
         cf.mem.mem_read_cb.add_callback(lambda _, __, data: done.append(bytes(data)))
         assert cf.mem.read(types[0x1E], 0, 64)
@@ -360,7 +360,7 @@ def missed_its_host(sil: SilProcess) -> bool:
     return native.library().rule_name(int(sil.get("ivl.cause"))) == "host"
 
 
-def test_first_flight_of_the_documentation_lands():
+def test_first_flight_of_the_documentation_lands_twice_on_the_same_vehicle():
     flown_by_make_sil = load("experiments/paper_flight.yaml").make_world()
     for _ in range(5):
         with SilProcess(flown_by_make_sil) as sil:
@@ -376,7 +376,11 @@ def test_first_flight_of_the_documentation_lands():
             assert 3.9 <= values["ivl.trg_rrev"] < 4.2
             assert sil.get("simTruth.z") > 2.0
             again = first_flight(sil)
-            assert again.returncode == 1, "the snapshot of the landing before must not be taken for a second one"
-            assert "no landing" in again.stderr.splitlines()[-1]
+            if again.returncode == 1 and missed_its_host(sil):
+                continue
+            assert again.returncode == 0, again.stderr
+            twice = ast.literal_eval(again.stdout.splitlines()[-1])
+            assert twice["ivl.phase"] in (5, 6)
+            assert twice["ivl.trg_seq"] > values["ivl.trg_seq"]
             return
     pytest.fail("the machine was too busy for real time, five times")

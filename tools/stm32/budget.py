@@ -26,7 +26,7 @@ CLOCK_HZ = 168e6
 TICK_HZ = 500.0
 VEHICLE_BUILD = "stm32-Os"
 """Compiled as the vehicle's firmware is: the budget of the flash is that of this build."""
-LIMITS = {"flash_bytes": 18432, "ram_bytes": 2048, "stack_bytes": 512, "instructions_max": 3300, "cpu_percent": 2.0}
+LIMITS = {"flash_bytes": 18944, "ram_bytes": 2048, "stack_bytes": 512, "instructions_max": 3300, "cpu_percent": 2.0}
 MARGINS = {"flash_bytes": 0.03, "ram_bytes": 0.0, "stack_bytes": 0.05, "instructions_max": 0.05, "bound_max": 0.05}
 """Growth over the baseline that is accepted without an update of it."""
 _COUNTED_TICKS = 200_000
@@ -114,7 +114,7 @@ def _counts(program: Path, recorded: recording.Recording) -> dict[str, list[int]
     if run.returncode != 0:
         raise RuntimeError(f"{program}: exit code {run.returncode}: {run.stderr.strip()}")
     rows = (line.split(",") for line in run.stderr.splitlines() if line.count(",") == 4)
-    return {name: [int(number) for number in numbers] for name, *numbers in rows}
+    return {PHASES[int(number)]: [int(count) for count in counts] for number, *counts in rows}
 
 
 def worst(figures: dict[str, Any], name: str) -> float:

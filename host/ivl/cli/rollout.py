@@ -29,7 +29,8 @@ Examples:
   ivl rollout --experiment experiments/paper_vertical.yaml --rrev 4.8 --moment 8
       the landing that an experiment learns; without it the legs are those of table1, which were built and flown
   ivl rollout --policy g.yaml --speed 1.2 --angle 35 --plot landing.png
-      a policy for every approach (ivl policy learn), on what it was learned on, unless other options say otherwise
+      a policy for every approach (ivl policy learn), on what it was learned on, unless other options say otherwise; if
+      it calls the approach off, the verdict says no_go, and the picture shows how the vehicle levels out
 """
 
 
@@ -87,6 +88,7 @@ def _result(world: World, flight: Trace) -> dict[str, Any]:
     """The outcome's fields by name, and what they amount to."""
     record = flight.outcome
     result = outcome.as_dict(record, world.end_reason(record.end_reason))
+    result["verdict"] = outcome.verdict(record)
     batch = np.array([record], dtype=record.dtype)
     result["four_leg"] = bool(outcome.four_leg(batch)[0])
     result["clean"] = bool(outcome.clean(batch)[0])

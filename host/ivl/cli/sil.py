@@ -19,13 +19,15 @@ docs/SIL.md says what it does, docs/first_flight.py is a first program.
 \b
 Examples:
   ivl sil
-      the paper's vehicle in real time
+      a Crazyflie 2.1 in real time
   ivl sil --experiment experiments/paper_vertical.yaml --speed max
       what an experiment flies, as fast as possible
   ivl sil --policy g.yaml
       what a policy for every approach was learned on; fly it with: ivl fly --policy g.yaml --uri udp://127.0.0.1:19850
-  ivl sil --vehicle crazyflie21 --vehicles 8
+  ivl sil --vehicles 8
       eight vehicles on ports 19850 .. 19857
+  ivl sil --deck bcFlow2 --deck bcMultiranger
+      with two decks; --deck none leaves out the usual one, bcFlow2
   ivl sil --lockstep
       time stands still until the client writes sil.run_to_ms
   ivl sil --fault loss=0.05 --fault jitter_ms=50 --control 20850
@@ -35,7 +37,10 @@ Examples:
 """
 
 
-@task_options(*EQUIPMENT)
+VEHICLE = "crazyflie21"  # turns, as every Crazyflie; the paper's simulated vehicle does not
+
+
+@task_options(*EQUIPMENT, vehicle=VEHICLE)
 def sil(
     chosen: Chosen,
     policy_file: Annotated[
@@ -48,6 +53,7 @@ def sil(
     lockstep: Annotated[bool, typer.Option(help="Time advances only as the client asks.")] = False,
     packets: Annotated[int, typer.Option(help="Packets/s to the client, at most, when time is not paced.")] = 8000,
     seed: Annotated[int, typer.Option(help="Seed of the sensors' noise.", min=0)] = 0,
+    deck: Annotated[list[str] | None, typer.Option(metavar="NAME|none", help="A deck on board: bcFlow2, ...")] = None,
     fault: Annotated[list[str] | None, typer.Option(metavar="NAME=X", help="A fault of the link: loss, ...")] = None,
     control: Annotated[int | None, typer.Option(help="UDP port that no fault touches; 0 takes a free one.")] = None,
     write_model: Annotated[Path | None, typer.Option(help="Write the parameters to FILE and stop.")] = None,
@@ -65,9 +71,16 @@ def sil(
     command += [] if control is None else ["--control", str(control)]
     for item in fault or []:
         command += ["--fault", item]
+    for name in deck or []:
+        command += ["--deck", name]
     console.err.print(
         f"{world.vehicle} with gear {world.gear} of {world.gear_set}; Ctrl-C stops", highlight=False, soft_wrap=True
     )
+    if world.params.values["aero.yaw_torque"] == 0.0:
+        console.err.print(
+            f"{world.vehicle} cannot turn: its aero.yaw_torque is 0, so that yaw commands change nothing",
+            soft_wrap=True,
+        )
     _become(command, text)
 
 

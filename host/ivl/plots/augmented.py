@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 
-from ivl.plots import campaign, style
+from ivl.plots import spaces, style
 from ivl.plots.campaign import Campaign
-from ivl.plots.fig05_state_space import color_bar, scatter_3d
+from ivl.plots.fig05_state_space import scatter_3d
 from ivl.plots.fig06_flow_space import limit
 
 N_SLICES = 4
@@ -30,7 +30,7 @@ def draw_space(
 ) -> list[Path]:
     """Points in space on the left; on the right the same points in slices of d that hold as many points each."""
     figure = style.new_figure(7.5, 4.1)
-    space, place = campaign.space_and_planes(figure, 0.5)
+    space, place = spaces.space_and_planes(figure, 0.5)
     shown = _inner(found)
     image = scatter_3d(
         space,
@@ -41,7 +41,7 @@ def draw_space(
         quantity.limits,
     )
     space.view_init(elev=18, azim=-55)
-    color_bar(figure, image, place, quantity.label)
+    spaces.color_bar(figure, image, place, quantity.label)
     axes = figure.subplots(2, 2).flat
     for i, (axis, (low_m, high_m, part)) in enumerate(zip(axes, _slices(shown), strict=False)):
         axis.scatter(
@@ -50,7 +50,7 @@ def draw_space(
             edgecolors=style.GREY,
         )  # fmt: skip
         limit(axis, shown)
-        campaign.label_2d(axis, "of_y_radps", "rrev_per_s")
+        spaces.label_2d(axis, "of_y_radps", "rrev_per_s")
         axis.set_title(f"$d$ = {low_m:.2f} to {high_m:.2f} m", fontsize=style.SMALL)
         if i % 2:
             axis.set_ylabel("")

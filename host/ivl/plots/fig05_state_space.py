@@ -6,11 +6,11 @@ from typing import Any
 
 import pandas as pd  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ivl.analysis.region import STATE
-from ivl.plots import campaign, style
-from ivl.plots.campaign import RATE_MAP, Campaign
+from ivl.plots import campaign, spaces, style
+from ivl.plots.campaign import Campaign
+from ivl.plots.spaces import RATE_MAP
 
 NAME = "fig05_state_space"
 
@@ -25,26 +25,19 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
     """
     found = campaign.points(data)
     figure = style.new_figure(7.5, 3.9)
-    space, place = campaign.space_and_planes(figure, 0.58)
+    space, place = spaces.space_and_planes(figure, 0.58)
     image = scatter_3d(space, found, STATE, found["rate_norm"], RATE_MAP, (0.0, 1.0))
     space.view_init(elev=20, azim=-120)
     axes = figure.subplots(2, 1)
     for axis, (x, y) in zip(axes, (("vx_mps", "vz_mps"), ("vz_mps", "d_ceil_m")), strict=True):
         scatter_2d(axis, found, x, y)
-    color_bar(figure, image, place, "landing rate of the trial")
+    spaces.color_bar(figure, image, place, "landing rate of the trial")
     figure.suptitle(
         f"{data.title('gear', 'gear_set', 'vehicle', 'learner')}; success (rate ≥ 0.8) in $(V_x, V_z, d)$: "
         f"{campaign.auc_text(found, 'state')}",
         fontsize=style.NORMAL,
     )
     return style.save(figure, paths, dpi)
-
-
-def color_bar(figure: Figure, image: Any, place: Axes, label: str) -> None:
-    """A horizontal colour bar."""
-    bar = figure.colorbar(image, cax=place, orientation="horizontal")
-    bar.set_label(label, fontsize=style.NORMAL)
-    bar.ax.tick_params(labelsize=style.SMALL)
 
 
 def scatter_3d(
@@ -61,7 +54,7 @@ def scatter_3d(
         *(found[c] for c in columns), c=color, s=size, cmap=color_map, vmin=limits[0], vmax=limits[1],
         depthshade=False, linewidths=0.15, edgecolors=style.GREY,
     )  # fmt: skip
-    campaign.label_3d(axis, columns)
+    spaces.label_3d(axis, columns)
     return image
 
 
@@ -72,4 +65,4 @@ def scatter_2d(axis: Axes, found: pd.DataFrame, x: str, y: str) -> None:
         found[x], found[y], c=found["rate_norm"], s=size, cmap=RATE_MAP, vmin=0, vmax=1, linewidths=0.15,
         edgecolors=style.GREY,
     )  # fmt: skip
-    campaign.label_2d(axis, x, y)
+    spaces.label_2d(axis, x, y)

@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped]
 from matplotlib.axes import Axes
 
-from ivl.plots import campaign, style
-from ivl.plots.campaign import RATE_MAP, Campaign
+from ivl.plots import campaign, spaces, style
+from ivl.plots.campaign import Campaign
+from ivl.plots.spaces import RATE_MAP
 
 NAME = "fig06_flow_space"
 _ABOVE_PT = 15.0
@@ -53,7 +54,7 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
     limit(left, found)
     for axis in (left, right):
         _draw_angles(axis)
-        campaign.label_2d(axis, "of_y_radps", "rrev_per_s")
+        spaces.label_2d(axis, "of_y_radps", "rrev_per_s")
     bar = figure.colorbar(image, ax=left, location="bottom", shrink=0.8, aspect=30)
     bar.set_label("landing rate", fontsize=style.NORMAL)
     bar.ax.tick_params(labelsize=style.SMALL)

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from ivl.plots import campaign, style
 from ivl.plots.augmented import Quantity, draw_space
-from ivl.plots.campaign import RATE_MAP, Campaign
+from ivl.plots.campaign import Campaign
+from ivl.plots.spaces import RATE_MAP
 
 NAME = "fig07_augmented_space"
 

@@ -8,7 +8,7 @@ import numpy as np
 from ivl.analysis.moment import explained
 from ivl.analysis.region import AUGMENTED
 from ivl.errors import ConfigError
-from ivl.plots import campaign, style
+from ivl.plots import campaign, spaces, style
 from ivl.plots.augmented import Quantity, draw_space
 from ivl.plots.campaign import Campaign
 
@@ -40,5 +40,5 @@ def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pa
         )
     limits = (float(np.floor(moment.min())), float(np.ceil(moment.max())))
     return draw_space(
-        data, found, Quantity("moment_Nmm", campaign.LABELS["moment_Nmm"], "viridis", limits), title, paths, dpi
+        data, found, Quantity("moment_Nmm", spaces.LABELS["moment_Nmm"], "viridis", limits), title, paths, dpi
     )

@@ -16,7 +16,8 @@ from ivl import model
 from ivl.analysis.rates import cell_rates, mean_rate
 from ivl.outcome import SOLVED_SHARE, solved
 from ivl.plots import campaign, style
-from ivl.plots.campaign import RATE_MAP, Campaign
+from ivl.plots.campaign import Campaign
+from ivl.plots.spaces import RATE_MAP
 
 NAME = "fig09_gears"
 ORDER = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")

@@ -79,7 +79,7 @@ def draw_all(
     for name in names or ():
         if not any(f.name.startswith(name) for f in FIGURES):
             raise ConfigError(f"no figure {name!r} (allowed {', '.join(f.name for f in FIGURES)})")
-    folder.mkdir(parents=True, exist_ok=True)
+    style.make_folder(folder)
     drawn = Drawn([], {})
     for figure in wanted:
         part = data.select(**{c: v for c, v in chosen.items() if c in figure.single})

@@ -1,7 +1,8 @@
 """A landing as a strobe picture: side view of body, legs, propellers and surface at equal time steps.
 
 The view is along the surface, from the surface's own frame: of a level ceiling, x and z of the world. Left the approach
-and the flip, until touch-down; right the touch-down and the swing, enlarged and with finer steps.
+and the flip, until touch-down; right the touch-down and the swing, enlarged and with finer steps. Of a flight that its
+policy called off: left until the decision and the rise to the closest point, right how it levels out from there.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from ivl.learning.recorder import SCORED
-from ivl.outcome import four_leg
+from ivl.outcome import four_leg, verdict
 from ivl.plots import style
 from ivl.run import RunResult
 from ivl.seeds import Purpose, derive
@@ -25,6 +26,7 @@ from ivl.world import Trace, World, rotation
 
 N_GHOSTS = 8
 _BEFORE_TRIGGER_S, _SWING_S = 0.03, 0.14
+_LEVEL_OUT_S = 0.4
 # legs 1 front-right, 2 rear-right, 3 rear-left, 4 front-left
 _LEG_SIGNS = np.array([[1, -1], [-1, -1], [-1, 1], [1, 1]])
 
@@ -60,14 +62,18 @@ def draw(world: World, trace: Trace, paths: Sequence[Path]) -> list[Path]:
     """
     figure = style.new_figure(7.5, 5.0)
     left, right = figure.subplots(1, 2)
-    first_s, touch_s, last_s = _window(trace)
-    _draw_panel(figure, left, world, trace, first_s, touch_s, "approach and flip")
-    _draw_panel(figure, right, world, trace, touch_s, last_s, "touch-down and swing")
+    first_s, touch_s, last_s = _window(world, trace)
+    titles = (
+        ("approach and rise", "level-out") if trace.outcome.no_go else ("approach and flip", "touch-down and swing")
+    )
+    _draw_panel(figure, left, world, trace, first_s, touch_s, titles[0])
+    _draw_panel(figure, right, world, trace, touch_s, last_s, titles[1])
     left.set_ylabel(_labels(world)[1])
     figure.suptitle(_title(world, trace), fontsize=style.NORMAL)
-    for label, time_s, color in _events(trace):
+    events = _events(world, trace)
+    for label, time_s, color in events:
         left.plot([], [], color=color, linewidth=2.2, label=f"{label}, t = {time_s:.3f} s")
-    if _events(trace):
+    if events:
         figure.legend(loc="outside lower center", ncols=2, fontsize=style.SMALL, frameon=False)
     return style.save(figure, paths)
 
@@ -80,7 +86,7 @@ def _draw_panel(
     times = np.linspace(first_s, last_s, N_GHOSTS)
     for time_s in times:
         _draw_vehicle(axis, world, _row_at(rows, time_s), color_map(scale(time_s)), 1.0)
-    for _, time_s, color in _events(trace):
+    for _, time_s, color in _events(world, trace):
         if first_s <= time_s <= last_s:
             _draw_vehicle(axis, world, _row_at(rows, time_s), color, 2.0)
     path = (rows.t_s >= first_s) & (rows.t_s <= last_s)
@@ -98,20 +104,32 @@ def _draw_panel(
     style.finish(axis)
 
 
-def _window(trace: Trace) -> tuple[float, float, float]:
+def _window(world: World, trace: Trace) -> tuple[float, float, float]:
     """Start of the picture, touch-down (closest approach if there was none), and end."""
     rows, outcome = trace.rows, trace.outcome
     touch_s = float(outcome.t_impact_s)
     if not np.isfinite(touch_s):
-        touch_s = float(rows.t_s[int(np.argmin(rows.d_ceil_m))])
+        touch_s = _closest_s(trace)
+    if outcome.no_go:
+        return (
+            max(0.0, world.called_off_s(trace) - _BEFORE_TRIGGER_S),
+            touch_s,
+            min(touch_s + _LEVEL_OUT_S, rows.t_s[-1]),
+        )
     trigger_s = float(outcome.t_trigger_s) if np.isfinite(outcome.t_trigger_s) else touch_s - 0.2
     first_s = max(0.0, min(trigger_s - _BEFORE_TRIGGER_S, touch_s - _BEFORE_TRIGGER_S))
     return first_s, touch_s, touch_s + _SWING_S
 
 
-def _events(trace: Trace) -> list[tuple[str, float, str]]:
+def _closest_s(trace: Trace) -> float:
+    return float(trace.rows.t_s[int(np.argmin(trace.rows.d_ceil_m))])
+
+
+def _events(world: World, trace: Trace) -> list[tuple[str, float, str]]:
     outcome = trace.outcome
-    found = (("trigger", outcome.t_trigger_s, style.VERMILION), ("touch-down", outcome.t_impact_s, style.PURPLE))
+    found = [("trigger", outcome.t_trigger_s, style.VERMILION), ("touch-down", outcome.t_impact_s, style.PURPLE)]
+    if outcome.no_go:
+        found = [("no-go", world.called_off_s(trace), style.VERMILION), ("closest", _closest_s(trace), style.PURPLE)]
     return [(label, float(time_s), color) for label, time_s, color in found if np.isfinite(time_s)]
 
 
@@ -161,6 +179,4 @@ def _draw_gravity(axis: Axes, world: World) -> None:
 
 
 def _title(world: World, trace: Trace) -> str:
-    outcome = trace.outcome
-    contact = ", body contact" if outcome.body_contact else ""
-    return f"{world.vehicle}, {world.gear_set}/{world.gear}: {outcome.n_legs} feet stuck{contact}"
+    return f"{world.vehicle}, {world.gear_set}/{world.gear}: {verdict(trace.outcome)}"

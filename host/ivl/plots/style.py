@@ -29,6 +29,18 @@ def finish(axis: Axes) -> None:
         label.set_fontsize(NORMAL)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder for figures, if it is not there.
+
+    Raises:
+        ConfigError: It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{folder}: the folder cannot be made: {error}") from error
+
+
 def save(figure: Figure, paths: Sequence[Path], dpi: int = DPI) -> list[Path]:
     """Write the figure to each path, in the format of its suffix; equal figures become equal files.
 

@@ -17,7 +17,7 @@ from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import go
 from ivl.policy.file import PolicyFile
 from ivl.policy.flying import Family, Place, PolicyTask, fly
-from ivl.policy.region import BOX, PLANE, Region, Series
+from ivl.policy.region import BOX, PLANE, Approaches, Region, Series
 from ivl.policy.shape import FloatArray, General, is_general
 from ivl.seeds import Purpose
 from ivl.sensing import APPROACHES
@@ -142,7 +142,7 @@ def assess(
     free = General(policy.form).always_go(theta) if is_general(policy.form) else theta
 
     def rates(name: str, flown_by: Sequence[Place]) -> Rates:
-        approaches = _series(_SERIES[name], seed).next(n_approaches)
+        approaches = fresh(_SERIES[name], n_approaches, seed)
         flown = fly(flown_by, policy.form, free, approaches, threads)
         return _rates(flown) if family is None else _rates_of_vehicles(flown)
 
@@ -153,8 +153,9 @@ def assess(
     return Assessment(rates("box", places), rates("plane", places), led, judged)
 
 
-def _series(region: Region, seed: int) -> Series:
-    return Series([region], seed, Purpose.ASSESS)
+def fresh(region: Region, n: int, seed: int) -> Approaches:
+    """Approaches that no learning has seen."""
+    return Series([region], seed, Purpose.ASSESS).next(n)
 
 
 def _places(tasks: Sequence[PolicyTask], family: Family | None) -> list[Place]:
@@ -193,7 +194,7 @@ def _mean_over_vehicles(shares: FloatArray) -> Estimate:
 
 
 def _go(general: General, places: Sequence[Place], theta: FloatArray, n: int, seed: int, threads: int | None) -> Go:
-    approaches = _series(PLANE, seed).next(n)
+    approaches = fresh(PLANE, n, seed)
     policies = np.stack([general.always_go(theta), theta])
     flown = fly(places, general.form.name, policies, approaches, threads)
     free, own = (np.concatenate([outcomes[i] for outcomes in flown]) for i in (0, 1))

@@ -63,7 +63,21 @@ def fly(
     Returns:
         Outcomes of each place, shape (..., n).
     """
-    columns = np.moveaxis(np.asarray(theta, dtype=np.float64)[..., None, :], -1, 0)
+    return _fly(places, form, np.asarray(theta, dtype=np.float64)[..., None, :], approaches, threads)
+
+
+def fly_own(
+    places: Sequence[Place], form: str, theta: npt.ArrayLike, approaches: Approaches, threads: int | None = None
+) -> list[Outcomes]:
+    """Fly each approach with a policy of its own, theta of shape (n, dim); outcomes of each place, shape (n,)."""
+    return _fly(places, form, np.asarray(theta, dtype=np.float64), approaches, threads)
+
+
+def _fly(
+    places: Sequence[Place], form: str, theta: FloatArray, approaches: Approaches, threads: int | None
+) -> list[Outcomes]:
+    """Fly policies whose shape (..., 1 or n, dim) meets that of the approaches, (n,)."""
+    columns = np.moveaxis(theta, -1, 0)
     return [
         place.world.rollouts(
             approaches.speed_mps,

@@ -50,6 +50,11 @@ def has_decided(outcomes: Outcomes) -> BoolArray:
     return np.asarray(np.nan_to_num(outcomes["p_land"]) > 0)
 
 
+def would_refuse(outcomes: Outcomes, p_min: float) -> BoolArray:
+    """True where a policy that always goes would have refused with this `go_p_min`: also without any cue."""
+    return np.asarray((outcomes["decided"] == 1) & (outcomes["p_land"] < p_min))
+
+
 def fly_decisions(
     general: General, places: Sequence[Place], theta: FloatArray, approaches: Approaches, threads: int | None = None
 ) -> Decided:
@@ -145,11 +150,35 @@ def auc(p: FloatArray, landed: BoolArray) -> float:
     return float((rank[landed].sum() - 0.5 * n_good * (n_good + 1)) / (n_good * n_bad))
 
 
+@dataclass(frozen=True)
+class Bins:
+    """Decisions in equal bins of the probability.
+
+    Attributes:
+        edges: Edges of the bins, 0 .. 1, shape (n + 1,).
+        count: Decisions in each, shape (n,).
+        p: Their mean probability; NaN where there are none.
+        landed: Their share of landings; NaN where there are none.
+    """
+
+    edges: FloatArray
+    count: npt.NDArray[np.intp]
+    p: FloatArray
+    landed: FloatArray
+
+
+def binned(p: FloatArray, landed: BoolArray, n_bins: int = 10) -> Bins:
+    """Probabilities and what came of them, in bins."""
+    bins = np.minimum((p * n_bins).astype(np.intp), n_bins - 1)
+    count = np.bincount(bins, minlength=n_bins)
+    some = np.where(count > 0, count, np.nan)
+    means = [np.bincount(bins, weights=values, minlength=n_bins) / some for values in (p, landed)]
+    return Bins(np.linspace(0.0, 1.0, n_bins + 1), count, *means)
+
+
 def calibration_error(p: FloatArray, landed: BoolArray, n_bins: int = 10) -> float:
     """Mean distance of the share of landings from the mean probability, over equal bins of p, weighed by their size."""
     if not p.size:
         return float("nan")
-    bins = np.minimum((p * n_bins).astype(np.intp), n_bins - 1)
-    count = np.bincount(bins, minlength=n_bins)
-    differences = np.bincount(bins, weights=landed - p, minlength=n_bins)
-    return float(np.abs(differences).sum() / count.sum())
+    bins = binned(p, landed, n_bins)
+    return float(np.nansum(bins.count * np.abs(bins.landed - bins.p)) / bins.count.sum())

@@ -16,7 +16,7 @@ from ivl.policy.flying import Place, fly, objective
 from ivl.policy.general import GeneralExperiment
 from ivl.policy.region import Series
 from ivl.policy.shape import FloatArray, General
-from ivl.policy.start import fit, fly_map
+from ivl.policy.start import best_of, fit, fly_map
 from ivl.seeds import Purpose
 
 _DIGITS = 7  # of a number in single precision, which is what a vehicle keeps
@@ -113,7 +113,8 @@ class _Run:
         if start is not None and start.form != general.form.name:
             raise ConfigError(f"form {general.form.name}: the policy to start from is of the form {start.form}")
         self._say("map", 0.0)
-        self._best = fly_map(self._chosen, general, self._places, self._threads)
+        chosen = self._chosen
+        self._best = best_of(fly_map(chosen.map, chosen.regions, chosen.seed, general, self._places, self._threads))
         if not self._best.weight.size:
             raise ConfigError("no approach of these regions ends in a landing, whatever threshold and moment")
         theta = np.array(start.values) if start is not None else fit(general, self._best)

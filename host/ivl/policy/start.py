@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ivl.outcome import Outcomes
 from ivl.policy.flying import Place, fly, score
-from ivl.policy.general import GeneralExperiment, MapSettings
+from ivl.policy.general import MapSettings
 from ivl.policy.region import Approaches, Region
 from ivl.policy.shape import General
 from ivl.seeds import Purpose, derive
@@ -45,20 +46,80 @@ class Best:
     n_flights: int
 
 
-def fly_map(chosen: GeneralExperiment, general: General, places: Sequence[Place], threads: int | None = None) -> Best:
-    """Fly the map in every place and take each cell's best."""
-    grid = chosen.map
-    cells = _cells(grid, chosen.regions, derive(chosen.seed, Purpose.GRID))
+@dataclass(frozen=True)
+class Map:
+    """Flights of level policies, each of every threshold and moment in every cell.
+
+    Attributes:
+        speed_edges_mps: Edges of the cells along the speed, shape (n + 1,).
+        angle_edges_deg: Edges along the angle, shape (m + 1,).
+        tau_s: 1 / threshold of each policy, rising.
+        timing_s: Error of the trigger's instant over which `smoothed` is a mean.
+        moments_Nmm: Moments.
+        flown: Outcomes of each place, shape (moments, thresholds, cells); the angle of the cells runs faster.
+    """
+
+    speed_edges_mps: FloatArray
+    angle_edges_deg: FloatArray
+    tau_s: FloatArray
+    timing_s: float
+    moments_Nmm: FloatArray
+    flown: list[Outcomes]
+
+    def smoothed(self) -> list[FloatArray]:
+        """Scores of each place, smoothed."""
+        return [smooth(score(outcomes), self.tau_s, self.timing_s) for outcomes in self.flown]
+
+    def best_of_all(self) -> tuple[float, float]:
+        """Threshold and moment with the best mean score over all cells and places."""
+        scores = np.mean([score(outcomes).mean(axis=-1) for outcomes in self.flown], axis=0)
+        moment, threshold = np.unravel_index(int(np.argmax(scores)), scores.shape)
+        return float(1.0 / self.tau_s[threshold]), float(self.moments_Nmm[moment])
+
+    def best_of_cells(self) -> FloatArray:
+        """Threshold and moment with the best smoothed score of each cell, shape (cells, 2)."""
+        scores = np.mean(self.smoothed(), axis=0)
+        best = scores.reshape(-1, scores.shape[-1]).argmax(axis=0)
+        moment, threshold = np.unravel_index(best, scores.shape[:2])
+        return np.column_stack([1.0 / self.tau_s[threshold], self.moments_Nmm[moment]])
+
+    def cell_of(self, speed_mps: FloatArray, angle_deg: FloatArray) -> npt.NDArray[np.intp]:
+        """Number of the cell of each approach; one beyond the edges belongs to the cell at the edge."""
+        found = []
+        for values, edges in ((speed_mps, self.speed_edges_mps), (angle_deg, self.angle_edges_deg)):
+            found.append(np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2))
+        return np.asarray(found[0] * (len(self.angle_edges_deg) - 1) + found[1])
+
+
+def fly_map(
+    grid: MapSettings,
+    regions: Sequence[Region],
+    seed: int,
+    general: General,
+    places: Sequence[Place],
+    threads: int | None = None,
+) -> Map:
+    """Fly the map in every place."""
+    edges = _edges(grid, regions)
+    speed, angle = np.meshgrid(*(0.5 * (edge[1:] + edge[:-1]) for edge in edges), indexing="ij")
+    stream = np.arange(speed.size, dtype=np.uint64)
+    cells = Approaches(speed.reshape(-1), angle.reshape(-1), stream, derive(seed, Purpose.GRID))
     tau_s = np.linspace(grid.tau_s[0], grid.tau_s[1], grid.n_thresholds)
     most_Nmm = moment_most_Nmm(places)
     moments = np.minimum(most_Nmm * np.array(grid.moments_norm), general.bounds[general.moment.start, 1])
     theta = general.level(1.0 / tau_s, moments[:, None])
-    flown = fly(places, general.form.name, theta, cells, threads)  # (moments, thresholds, cells) each
-    smoothed = [smooth(score(outcomes), tau_s, grid.timing_s) for outcomes in flown]
+    flown = fly(places, general.form.name, theta, cells, threads)
+    return Map(*edges, tau_s, grid.timing_s, moments, flown)
+
+
+def best_of(flown: Map) -> Best:
+    """Each cell's best threshold, at the moment that is best for all."""
+    smoothed = flown.smoothed()
     moment = int(np.argmax(np.mean([s.max(axis=1).mean(axis=-1) for s in smoothed], axis=0)))
-    found = [_best_of(o[moment], s[moment], 1.0 / tau_s) for o, s in zip(flown, smoothed, strict=True)]
+    found = [_best_of(o[moment], s[moment], 1.0 / flown.tau_s) for o, s in zip(flown.flown, smoothed, strict=True)]
     vx, vz, threshold, weight = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return Best(vx, vz, threshold, weight, float(moments[moment]), len(places) * theta[..., 0].size * len(cells))
+    n_flights = sum(outcomes.size for outcomes in flown.flown)
+    return Best(vx, vz, threshold, weight, float(flown.moments_Nmm[moment]), n_flights)
 
 
 def moment_most_Nmm(places: Sequence[Place]) -> float:
@@ -66,15 +127,14 @@ def moment_most_Nmm(places: Sequence[Place]) -> float:
     return float(min(place.world.derived()["moment_y_max_Nmm"] for place in places))
 
 
-def _cells(grid: MapSettings, regions: Sequence[Region], seed: int) -> Approaches:
-    """Middles of equal cells that cover all regions."""
+def _edges(grid: MapSettings, regions: Sequence[Region]) -> tuple[FloatArray, FloatArray]:
+    """Edges of equal cells that cover all regions, along speed and angle."""
     limits = [np.array([getattr(region, name) for region in regions]) for name in ("speeds_mps", "angles_deg")]
-    axes = []
-    for limit, n in zip(limits, (grid.n_speeds, grid.n_angles), strict=True):
-        edges = np.linspace(limit[:, 0].min(), limit[:, 1].max(), n + 1)
-        axes.append(0.5 * (edges[1:] + edges[:-1]))
-    speed, angle = (axis.reshape(-1) for axis in np.meshgrid(*axes, indexing="ij"))
-    return Approaches(speed, angle, np.arange(speed.size, dtype=np.uint64), seed)
+    speed, angle = (
+        np.linspace(limit[:, 0].min(), limit[:, 1].max(), n + 1)
+        for limit, n in zip(limits, (grid.n_speeds, grid.n_angles), strict=True)
+    )
+    return speed, angle
 
 
 def smooth(scores: FloatArray, tau_s: FloatArray, timing_s: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""From a run folder to a page."""
+"""From a run folder, or a policy, to a page."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from ivl.errors import ConfigError, StoreError
+from ivl.policy.assess import Assessment
+from ivl.policy.file import PolicyFile
+from ivl.policy.survey import Survey
 from ivl.report import learn_page, page
 from ivl.report.landings import Album
 from ivl.store import read_manifest
@@ -50,7 +53,28 @@ def write(
         ConfigError: The file cannot be written.
     """
     data, album = _collector(folder)(folder, n_landings_max, on_landing)
-    path = out or folder / "report.html"
+    return _save(data, album, out or folder / "report.html")
+
+
+def write_policy(policy: PolicyFile, name: str, found: Survey, judged: Assessment, out: Path) -> Report:
+    """Write the page of a policy for every approach.
+
+    Args:
+        policy: The policy.
+        name: What the page calls it.
+        found: Flights of its pictures.
+        judged: Its numbers.
+        out: File to write.
+
+    Raises:
+        ConfigError: The file cannot be written.
+    """
+    from ivl.report import policy_page  # matplotlib takes a second to load
+
+    return _save(*policy_page.collect(policy, name, found, judged), out)
+
+
+def _save(data: dict[str, Any], album: Album, path: Path) -> Report:
     text = page.render(data)
     try:
         path.write_text(text, encoding="utf-8")

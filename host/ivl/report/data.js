@@ -26,11 +26,23 @@ function unpack(landing, scale) {
   return landing;
 }
 
-// Time that the clock of the replay calls zero: the trigger, or the closest approach of a landing without one.
-function origin(landing) {
-  if (landing.outcome.t_trigger_s !== null) return landing.outcome.t_trigger_s;
+// When the vehicle is closest to the ceiling.
+function closest(landing) {
   const z = landing.p[2];
   return landing.t[z.indexOf(Math.max(...z))];
+}
+
+// Time that the clock of the replay calls zero: the trigger; of a flight without one the no-go, or the closest approach.
+function origin(landing) {
+  if (landing.outcome.t_trigger_s !== null) return landing.outcome.t_trigger_s;
+  if (landing.outcome.t_no_go_s !== null) return landing.outcome.t_no_go_s;
+  return closest(landing);
+}
+
+// What happens at that time.
+function zeroOf(landing) {
+  if (landing.outcome.t_trigger_s !== null) return "the trigger";
+  return landing.outcome.no_go ? "the no-go" : "the closest approach";
 }
 
 // Last index whose time is <= t (0 if none is).

@@ -88,6 +88,27 @@ function fillChoice(select, labels, onChoice) {
   select.addEventListener("change", () => onChoice(Number(select.value)));
 }
 
+// ---- a policy for every approach
+
+function showPolicy(data, replay) {
+  const { numbers, pictures, notable } = data.policy;
+  ["#numbers", "#pictures", "#notable"].forEach((id) => { $(id).hidden = false; });
+  $("#convergence").hidden = true;
+  table($("#numbers-table"), numbers.head, numbers.rows);
+  $("#numbers-note").textContent = numbers.note;
+  pictures.forEach(({ title, source }) => {
+    const figure = element("figure");
+    figure.append(element("img", undefined, { src: source, alt: title }), element("figcaption", title));
+    $("#pictures-list").append(figure);
+  });
+  $("#notable-title").textContent = "Flights with this policy";
+  table($("#notable-table"), ["flight", "V", "φ", "verdict", "replay"], notable.map(({ what, landing }) => {
+    const { outcome, spec } = data.landings[landing];
+    return [what, `${spec.speed_mps.toFixed(2)} m/s`, `${spec.angle_deg.toFixed(1)}°`, outcome.verdict, replayButtons(replay, landing, what)];
+  }));
+  [1, 0].forEach((pane) => replay.show(pane, notable[Math.min(pane, notable.length - 1)].landing));
+}
+
 // ---- a run of `ivl sweep`
 
 class SweepView {
@@ -195,11 +216,12 @@ class SweepView {
 }
 
 async function start() {
-  const [text, library] = await Promise.all([inflate("data"), inflate("plotly")]);
-  document.head.append(element("script", library));
-  const data = JSON.parse(text), replay = new Replay($("#replay"), data);
+  const data = JSON.parse(await inflate("data"));
+  if (!data.policy) document.head.append(element("script", await inflate("plotly")));
+  const replay = new Replay($("#replay"), data);
   fillHeader(data);
-  const view = data.sweep ? new SweepView(data, replay) : showLearn(data, replay);
+  const show = data.sweep ? (...of) => new SweepView(...of) : data.policy ? showPolicy : showLearn;
+  const view = show(data, replay);
   window.report = { data, replay, view };
   document.body.dataset.ready = "true";
 }

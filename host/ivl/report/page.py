@@ -30,18 +30,21 @@ def render(data: Mapping[str, Any]) -> str:
     """The page as HTML.
 
     Args:
-        data: Plain data; what the scripts read of it is what `learn_page` and `sweep_page` write.
+        data: Plain data; what the scripts read of it is what `learn_page`, `sweep_page` and `policy_page` write. The
+            page of a policy has its pictures ready, and no plotly.
     """
     panes = "".join(_read("pane.html").replace("{{name}}", n).replace("{{NAME}}", n.upper()) for n in "ab")
     footer = (
-        f"Made by ivl {ivl.__version__} from the run's own files; landings flown again by its simulator. "
+        f"Made by ivl {ivl.__version__} from a policy file; flights by its simulator."
+        if "policy" in data
+        else f"Made by ivl {ivl.__version__} from the run's own files; landings flown again by its simulator. "
         "Figures: plotly.js (MIT)."
     )
     parts = {
         "style": _read("page.css"),
         "panes": panes,
         "footer": escape(footer),
-        "plotly": _compressed(get_plotlyjs()),
+        "plotly": "" if "policy" in data else _compressed(get_plotlyjs()),
         "data": _compressed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
         "script": '"use strict";\n' + "\n".join(_read(name) for name in SCRIPTS),
     }

@@ -56,7 +56,7 @@ class Replay {
 
   contactOf(landing) {
     const t = landing.outcome.t_impact_s;
-    return (t === null ? landing.t0 : t) - landing.t0;
+    return (t === null ? closest(landing) : t) - landing.t0;
   }
 
   // Span of the slider, of the slow part, and the marks of what happened.
@@ -68,7 +68,10 @@ class Replay {
     this.slowTo = Math.max(...landings.map((l) => this.contactOf(l))) + 0.15;
     const marks = this.root.querySelector("#marks");
     marks.replaceChildren();
-    this.mark(marks, 0, "trigger", "trigger", 0);
+    const zeros = landings.map(zeroOf), alike = zeros.every((zero) => zero === zeros[0]);
+    const told = alike ? zeros[0] : zeros.map((zero, i) => `${zero} (${"AB"[i]})`).join(", ");
+    this.root.querySelector("#zero").textContent = `from ${told}`;
+    this.mark(marks, 0, "trigger", told, 0);
     this.shown().forEach((pane) => {
       const row = this.panes.indexOf(pane);
       pane.landing.feet.filter((event) => event[2] === 2).forEach((event) => this.mark(marks, event[0] - pane.landing.t0, "stick", `${"AB"[row]}: foot ${event[1] + 1} sticks`, row));
@@ -86,10 +89,9 @@ class Replay {
   describe(pane) {
     const { spec, outcome, label } = pane.landing, part = (name) => this.root.querySelector(`#${name}-${pane.name}`);
     part("title").textContent = label;
-    const legs = `${outcome.n_legs} feet stuck`, body = outcome.body_contact || outcome.base_contact ? ", body contact" : ", clean";
-    part("verdict").textContent = outcome.n_legs ? legs + body : `no foot stuck${outcome.body_contact || outcome.base_contact ? ", body contact" : ""}`;
-    part("verdict").className = `verdict ${outcome.clean ? "good" : outcome.four_leg ? "fair" : "bad"}`;
-    part("spec").textContent = `V ${spec.speed_mps} m/s, φ ${spec.angle_deg}°, ${shown(this.data.parameters).map(([symbol, unit], i) => `${symbol} ${spec.theta[i].toFixed(3)} ${unit}`).join(", ")}`;
+    part("verdict").textContent = outcome.verdict;
+    part("verdict").className = `verdict ${outcome.clean ? "good" : outcome.four_leg || outcome.no_go ? "fair" : "bad"}`;
+    part("spec").textContent = `V ${Number(spec.speed_mps.toFixed(3))} m/s, φ ${Number(spec.angle_deg.toFixed(2))}°, ${shown(this.data.parameters).map(([symbol, unit], i) => `${symbol} ${spec.theta[i].toFixed(3)} ${unit}`).join(", ")}`;
     const offset = this.data.geometry[pane.landing.geometry].sensed_gap_offset;
     this.root.querySelector("#offset").textContent = offset ? `d sensed counts to a plane ${(1000 * offset).toFixed(0)} mm behind the ceiling.` : "";
     pane.canvas.setAttribute("aria-label", `Landing ${pane.name.toUpperCase()}: ${label}, ${part("verdict").textContent}. Arrow keys turn the view, plus and minus zoom.`);
@@ -98,7 +100,7 @@ class Replay {
   draw() {
     const clock = Number(this.slider.value) / 1000;
     this.root.querySelector("#clock").textContent = `${clock < 0 ? "−" : "+"}${Math.abs(1000 * clock).toFixed(0)} ms`;
-    this.slider.setAttribute("aria-valuetext", `${(1000 * clock).toFixed(0)} milliseconds after the trigger`);
+    this.slider.setAttribute("aria-valuetext", `${(1000 * clock).toFixed(0)} milliseconds after ${zeroOf(this.shown()[0].landing)}`);
     for (const pane of this.shown()) {
       pane.state = stateAt(pane.landing, clock + pane.landing.t0);
       pane.drawn = drawMoment(pane.canvas, pane.landing, this.data.geometry[pane.landing.geometry], pane.state, this.view);

@@ -37,7 +37,7 @@ def pack(spec: LandingSpec, world: World, trace: Trace, reward: RewardChoice) ->
         trace: The landing, in rows of one tick.
         reward: What the run paid for landings.
     """
-    rows = _window(trace)
+    rows = _window(world, trace)
     signals = _signals(world, rows)
     forced = _changes(rows["foot_state"]) | _changes(rows["phase"]) | _nearest(rows.t_s, trace.outcome)
     scaled = np.hstack([signals[name] / TOLERANCE[name] for name in TOLERANCE])
@@ -103,11 +103,13 @@ def keep_rows(t_s: FloatArray, values: FloatArray, forced: npt.NDArray[np.bool_]
     return np.flatnonzero(keep)
 
 
-def _window(trace: Trace) -> Any:
-    """Rows from shortly before the trigger (or the closest approach) until the swing has had its time."""
+def _window(world: World, trace: Trace) -> Any:
+    """Rows from shortly before the trigger (no-go, or closest approach) until the swing has had its time."""
     rows, result = trace.rows, trace.outcome
     closest_s = float(rows.t_s[int(np.argmin(rows.d_ceil_m))])
     trigger_s = float(result.t_trigger_s) if np.isfinite(result.t_trigger_s) else closest_s
+    if result.no_go:
+        trigger_s = world.called_off_s(trace)
     touch_s = float(result.t_impact_s) if np.isfinite(result.t_impact_s) else closest_s
     inside = (rows.t_s >= trigger_s - BEFORE_TRIGGER_S) & (rows.t_s <= touch_s + AFTER_CONTACT_S)
     return rows[inside]
@@ -189,6 +191,8 @@ def _result(world: World, trace: Trace, reward: RewardChoice) -> dict[str, Any]:
     record = trace.outcome
     plain = outcome.as_dict(record, world.end_reason(record.end_reason))
     result = {k: float(f"{v:.5g}") if isinstance(v, float) else v for k, v in plain.items()}
+    result["verdict"] = outcome.verdict(record)
+    result["t_no_go_s"] = world.called_off_s(trace) if record.no_go else None
     batch = np.array([record], dtype=native.library().outcome_dtype)
     result["four_leg"] = bool(outcome.four_leg(batch)[0])
     result["clean"] = bool(outcome.clean(batch)[0])

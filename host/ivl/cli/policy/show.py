@@ -7,10 +7,13 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from ivl.cli import console
+from ivl.cli import console, policy_options
+from ivl.cli.policy import survey_options
+from ivl.errors import ConfigError
 from ivl.policy import file
 from ivl.policy.file import PolicyFile
 from ivl.policy.shape import General, is_general
+from ivl.policy.survey import survey
 
 HELP = """Show what a policy file holds: numbers, origin, score, and its threshold R* over the sensed velocities.
 
@@ -20,22 +23,75 @@ Examples:
       for people
   ivl policy show g.yaml --json
       the file and the table, for a script
+  ivl policy show g.yaml --plot surface.png
+      a picture of threshold and probability over the velocities
+  ivl policy show g.yaml --plot pictures --approaches 2000
+      a folder of pictures: the surface; landing rates beside those of the paper's policy and of the best of each cell;
+      approaches in the flow space; go / no-go. They are flown for it, on what the policy was learned on
 """
 
+_SUFFIXES = (".png", ".pdf")
+"""Formats of the pictures in a folder."""
+_SINGLE = (".png", ".svg", ".pdf")
 _VX_MPS = np.arange(0.0, 4.01, 0.5)
 _VZ_MPS = np.arange(0.5, 4.01, 0.5)
 
 
 def show(
     path: Annotated[Path, typer.Argument(metavar="FILE", help="Policy file.")],
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw the surface into a file (.png, .svg, .pdf), or all pictures into a folder."),
+    ] = None,
+    approaches: survey_options.Approaches = None,
+    seed: survey_options.Seed = 0,
+    rrev: policy_options.Rrev = None,
+    moment: policy_options.Moment = None,
+    threads: survey_options.Threads = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Show a policy; HELP is the text that people see."""
     policy = file.load(path)
+    into_folder = plot is not None and (plot.is_dir() or not plot.suffix)
+    said = {"approaches": approaches, "seed": seed or None, "rrev": rrev, "moment": moment, "threads": threads}
+    for name, value in said.items():
+        if value is not None and not into_folder:
+            raise ConfigError(f"--{name}: is for --plot with a folder, for which alone flights are flown")
+    if plot is not None and not into_folder:
+        _draw_surface(policy, plot)
+    elif plot is not None:
+        constant, n = survey_options.constant_of(rrev, moment), approaches or survey_options.N_APPROACHES
+        _draw_all(policy, plot, n, seed, constant, threads)
     if as_json:
         console.print_json({**policy.model_dump(mode="json"), "crc": policy.crc, "table": _table(policy)})
     else:
         _print(policy)
+
+
+def _draw_surface(policy: PolicyFile, path: Path) -> None:
+    if path.suffix not in _SINGLE:
+        raise ConfigError(f"--plot {path}: unknown kind of file (allowed {', '.join(_SINGLE)}, or a folder)")
+    from ivl.plots import policy_surface  # matplotlib takes a second to load
+
+    policy_surface.draw(General(policy.form), np.array(policy.values), [path])
+
+
+def _draw_all(
+    policy: PolicyFile,
+    folder: Path,
+    n_approaches: int,
+    seed: int,
+    constant: tuple[float, float] | None,
+    threads: int | None,
+) -> None:
+    from ivl.plots import policy as pictures
+    from ivl.plots import style
+
+    General(policy.form)
+    style.make_folder(folder)
+    with console.err.status("flying"):
+        found = survey(policy, n_approaches, seed, constant, threads=threads)
+        pictures.draw_all(found, folder, _SUFFIXES)
 
 
 def _table(policy: PolicyFile) -> dict[str, Any] | None:
