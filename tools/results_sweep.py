@@ -11,13 +11,13 @@ between the two marks in RESULTS.md belongs to this program; everything else in 
 """
 
 import argparse
-import difflib
 import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import marked
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -60,15 +60,10 @@ def main(arguments: list[str] | None = None) -> int:
     if args.command == "collect":
         collect(args.runs, args.maps, args.data, args.keep)
         return 0
-    old = args.results.read_text(encoding="utf-8")
-    new = replace_section(old, section(read(args.data)))
+    new = section(read(args.data))
     if args.command == "write":
-        args.results.write_text(new, encoding="utf-8")
-        return 0
-    changes = difflib.unified_diff(old.splitlines(), new.splitlines(), str(args.results), "from the data", lineterm="")
-    different = list(changes)
-    print("\n".join(different[:60]) if different else f"{args.results.name}: equal to what {args.data} gives")
-    return 1 if different else 0
+        return marked.write(args.results, new, BEGIN, END)
+    return marked.check(args.results, new, BEGIN, END, args.data)
 
 
 def collect(runs: list[Path], maps: list[Path], folder: Path, keep: bool = False) -> None:
@@ -110,18 +105,6 @@ def section(data: Data) -> str:
     if data.trials.empty:
         return "No campaign has been collected into docs/data.\n"
     return campaign_text.write(data.trials, data.states, data.runs)
-
-
-def replace_section(text: str, new: str) -> str:
-    """The file's text with a new part between the marks.
-
-    Raises:
-        ValueError: The marks are not there, once each and in order.
-    """
-    if text.count(BEGIN) != 1 or text.count(END) != 1 or text.index(BEGIN) > text.index(END):
-        raise ValueError(f"expected {BEGIN} and, after it, {END}, once each")
-    head, tail = text[: text.index(BEGIN) + len(BEGIN)], text[text.index(END) :]
-    return f"{head}\n\n{new.strip()}\n\n{tail}"
 
 
 def _describe(run: Path) -> dict[str, Any]:

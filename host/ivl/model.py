@@ -85,10 +85,12 @@ class Parameters:
     Attributes:
         values: Value of each parameter, in table order.
         origin: Where each value comes from: a file's label, "default" or "override".
+        sigma: Standard deviation of each value that a file gives with one and that no override replaces.
     """
 
     values: Mapping[str, float]
     origin: Mapping[str, str]
+    sigma: Mapping[str, float]
 
     def vector(self) -> npt.NDArray[np.float64]:
         """The values as the library takes them, shape (n_params,)."""
@@ -261,19 +263,23 @@ def assemble(
     table = table or native.library().params
     values: dict[str, float] = {}
     origin: dict[str, str] = {}
+    sigma: dict[str, float] = {}
     for part in parts:
         for name, quantity in part.quantities.items():
             if name in values:
                 raise ConfigError(f"{part.label}: {name}: value {quantity.value!r} is also given by {origin[name]}")
             values[name], origin[name] = quantity.value, part.label
+            if quantity.sigma:
+                sigma[name] = quantity.sigma
     for name, value in (overrides or {}).items():
         values[name], origin[name] = check_override(name, value, table), "override"
+        sigma.pop(name, None)
     for name, field in table.items():
         if name not in values:
             if field.default is None:
                 raise ConfigError(f"{name} is missing: neither vehicle nor gear gives it (unit {field.unit})")
             values[name], origin[name] = field.default, "default"
-    return Parameters({n: values[n] for n in table}, {n: origin[n] for n in table})
+    return Parameters({n: values[n] for n in table}, {n: origin[n] for n in table}, sigma)
 
 
 def check_override(name: str, value: Any, table: Table | None = None) -> float:

@@ -19,6 +19,8 @@ class Purpose(IntEnum):
     GO = 8
     HELD_OUT = 9
     ASSESS = 10
+    FAMILY = 11
+    FAMILY_ASSESS = 12
 
 
 def derive(seed: int, purpose: Purpose) -> int:

@@ -172,7 +172,8 @@ class World:
         world = object.__new__(World)
         world.__dict__.update({k: v for k, v in self.__dict__.items() if k not in ("params", "surface", "_native")})
         world.overrides = {**self.overrides, **overrides}
-        world._build(model.Parameters(values, origin))
+        sigma = {name: value for name, value in self.params.sigma.items() if name not in overrides}
+        world._build(model.Parameters(values, origin, sigma))
         return world
 
     @property

@@ -1,5 +1,6 @@
 """Synthetic campaigns with known answers, in the columns of the sweep's tables."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 
 from ivl.layout import layout_of
 from ivl.sweep import config, folder, plan, schema, store, work
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
 
 LAYOUT = layout_of(config.load_sweep("sweeps/paper.yaml"))
 Rate = Callable[[pd.DataFrame], np.ndarray]

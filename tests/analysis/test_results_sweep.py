@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
+import marked
 import numpy as np
 import pandas as pd
 import pytest
@@ -100,7 +101,7 @@ def test_check_finds_an_edited_number(
 @pytest.mark.parametrize("text", ["", "{begin}", "{end}{begin}", "{begin}{end}{begin}{end}"])
 def test_a_file_without_its_marks_is_refused(tool: ModuleType, text: str) -> None:
     with pytest.raises(ValueError, match="once each"):
-        tool.replace_section(text.format(begin=tool.BEGIN, end=tool.END), "new")
+        marked.replace(text.format(begin=tool.BEGIN, end=tool.END), "new", tool.BEGIN, tool.END)
 
 
 def test_real_run_folders_are_collected(tool: ModuleType, fly: Fly, tmp_path: Path) -> None:

@@ -16,12 +16,13 @@ from ivl.outcome import clean, four_leg
 from ivl.policy import assess as judging
 from ivl.policy import file, general, use
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Place, fly
+from ivl.policy.flying import Family, Place, fly
 from ivl.policy.learn import Progress, learn
 from ivl.policy.region import PLANE, Region, Series
 from ivl.policy.shape import GO, General
 from ivl.seeds import Purpose
 from ivl.sweep import config as sweep_config
+from ivl.task import settings_of
 
 STEEP = Region(speeds_mps=[2.3, 2.7], angles_deg=[75.0, 90.0])
 Capture = pytest.CaptureFixture[str]
@@ -126,6 +127,29 @@ def test_two_tasks_count_both() -> None:
     assert [task.gear for task in both.tasks] == ["wide_short", "narrow_short"]
     assert both.score is not None
     assert both.score.flights == 2 * 60
+
+
+def test_a_family_takes_the_place_of_each_task_s_vehicle() -> None:
+    task = {"vehicle": "crazyflie21", "gear": "wide_long", "gear_set": "table1", "estimator": "known_height_predicted"}
+    drawn = {"n_vehicles": 3, "seed": 1}
+    regions = [{"speeds_mps": [3.0, 3.5], "angles_deg": [75.0, 90.0]}]
+    found = learn(tiny_experiment(tasks=[task], family=drawn, regions=regions))
+    assert found.training is not None
+    assert found.score is not None
+    assert found.training.family == Family(n_vehicles=3, seed=1)
+    assert found.score.flights == 3 * 60
+    members = Place.of(found.tasks[0]).members(Family(n_vehicles=3, seed=1), Purpose.FAMILY)
+    approaches = Series([Region.model_validate(regions[0])], 0, Purpose.SELECT).next(60)
+    flown = fly(members, "polynomial2", General("polynomial2").always_go(found.values), approaches)
+    assert found.score.landed == pytest.approx(np.mean([four_leg(o).mean() for o in flown]))
+    assert found.sealed() == found
+
+
+def test_a_family_of_a_vehicle_without_sigmas_is_said() -> None:
+    with pytest.raises(ConfigError, match="family: vehicle habas2021, gear as_simulated/wide_short: no parameter has"):
+        learn(tiny_experiment(family={"n_vehicles": 2}))
+    with pytest.raises(ConfigError, match=r"family\.n_vehicles: value 0"):
+        tiny_experiment(family={"n_vehicles": 0})
 
 
 def test_an_interruption_keeps_the_best_so_far() -> None:
@@ -296,6 +320,34 @@ def test_an_assessment_is_repeatable_and_of_fresh_approaches(by_hand: PolicyFile
     assert set(json.loads(text)) == {"box", "plane", "shaped", "go"}
     assert {"landed", "clean"} <= set(first["box"])
     assert {"auc", "calibration_error", "strikes_avoided", "refused_good", "level_out_contacts"} <= set(first["go"])
+
+
+def test_an_assessment_of_a_family_counts_its_vehicles(by_hand: PolicyFile) -> None:
+    task = TASK.model_copy(update={"vehicle": "crazyflie21", "gear": "wide_long", "gear_set": "table1"})
+    drawn = Family(n_vehicles=11, seed=5)
+    found = judging.assess(by_hand, [task], 40, 5, family=drawn)
+    members = Place.of(task).members(drawn, Purpose.FAMILY_ASSESS)
+    learned_on = Place.of(task).members(drawn, Purpose.FAMILY)
+    assert not {m.world.params.digest() for m in members} & {m.world.params.digest() for m in learned_on}
+    flown = fly(
+        members, "polynomial2", General("polynomial2").always_go(by_hand.values),
+        Series([PLANE], 5, Purpose.ASSESS).next(40),
+    )  # fmt: skip
+    shares = np.array([four_leg(o).mean() for o in flown])
+    assert found.plane.landed.value == pytest.approx(shares.mean())
+    assert found.plane.worst_tenth == pytest.approx(np.sort(shares)[:2].mean())
+    assert (found.plane.landed.n, found.plane.n_flights) == (11, 11 * 40)
+    assert found.as_dict()["plane"]["landed_worst_tenth"] == found.plane.worst_tenth
+    assert "landed_worst_tenth" not in judging.assess(by_hand, n_approaches=20).as_dict()["plane"]
+
+
+def test_a_shaped_approach_has_room_also_where_the_task_asks_for_less(by_hand: PolicyFile) -> None:
+    near, far = (
+        by_hand.model_copy(update={"tasks": [TASK.model_copy(update={"overrides": settings_of(room, "test")})]})
+        for room in ({"start.room": 0.5}, {"start.room": judging.SHAPED_ROOM_M})
+    )
+    shaped = [judging.assess(policy, n_approaches=60).shaped for policy in (by_hand, near, far)]
+    assert shaped[0] == shaped[1] == shaped[2]
 
 
 # ---- use

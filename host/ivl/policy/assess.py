@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ivl.analysis.intervals import Estimate, share_of
+from ivl.analysis.intervals import Estimate, share_of, wilson
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import go
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Place, PolicyTask, fly
+from ivl.policy.flying import Family, Place, PolicyTask, fly
 from ivl.policy.region import BOX, PLANE, Approaches, Region, Series
 from ivl.policy.shape import FloatArray, General, is_general
 from ivl.seeds import Purpose
@@ -37,20 +37,26 @@ class Rates:
     Attributes:
         landed: At least three legs hold.
         clean: And neither body nor rotors touched the ceiling.
+        worst_tenth: Share of landings of the tenth of the vehicles that land least, one at least; None if none were
+            drawn.
+        n_flights: Flights in all.
     """
 
     landed: Estimate
     clean: Estimate
+    worst_tenth: float | None
+    n_flights: int
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
+        data: dict[str, Any] = {
             "landed": self.landed.value,
             "clean": self.clean.value,
             "landed_interval": [self.landed.low, self.landed.high],
             "clean_interval": [self.clean.low, self.clean.high],
-            "flights": self.landed.n,
+            "flights": self.n_flights,
         }
+        return data if self.worst_tenth is None else {**data, "landed_worst_tenth": self.worst_tenth}
 
 
 @dataclass(frozen=True)
@@ -115,6 +121,7 @@ def assess(
     n_approaches: int = 2000,
     seed: int = 0,
     threads: int | None = None,
+    family: Family | None = None,
 ) -> Assessment:
     """Judge a policy.
 
@@ -124,20 +131,26 @@ def assess(
         n_approaches: Fresh approaches of each region.
         seed: Their seed; they differ from those of any learning.
         threads: Worker threads; omitted: all processors.
+        family: Vehicles that are drawn in place of each task's; they differ from those of any learning. Intervals are
+            then those of a mean over vehicles.
+
+    Raises:
+        ConfigError: Vehicles are to be drawn, and the files of a task give no parameter a sigma.
     """
-    places = [Place.of(task) for task in tasks or policy.tasks]
+    places = _places(tasks or policy.tasks, family)
     theta = np.array(policy.values)
     free = General(policy.form).always_go(theta) if is_general(policy.form) else theta
 
     def rates(name: str, flown_by: Sequence[Place]) -> Rates:
         approaches = fresh(_SERIES[name], n_approaches, seed)
-        return _rates(fly(flown_by, policy.form, free, approaches, threads))
+        flown = fly(flown_by, policy.form, free, approaches, threads)
+        return _rates(flown) if family is None else _rates_of_vehicles(flown)
 
-    shaped = None
+    led = None
     if SHAPED in APPROACHES:
-        shaped = rates("shaped", [Place.of(_shaped(place.task)) for place in places])
+        led = rates("shaped", _places([shaped(task) for task in tasks or policy.tasks], family))
     judged = _go(General(policy.form), places, theta, n_approaches, seed, threads) if is_general(policy.form) else None
-    return Assessment(rates("box", places), rates("plane", places), shaped, judged)
+    return Assessment(rates("box", places), rates("plane", places), led, judged)
 
 
 def fresh(region: Region, n: int, seed: int) -> Approaches:
@@ -145,14 +158,39 @@ def fresh(region: Region, n: int, seed: int) -> Approaches:
     return Series([region], seed, Purpose.ASSESS).next(n)
 
 
-def _shaped(task: PolicyTask) -> PolicyTask:
+def _places(tasks: Sequence[PolicyTask], family: Family | None) -> list[Place]:
+    places = [Place.of(task) for task in tasks]
+    if family is None:
+        return places
+    return [member for place in places for member in place.members(family, Purpose.FAMILY_ASSESS)]
+
+
+def shaped(task: PolicyTask) -> PolicyTask:
+    """The same task with the approach that leads into the region, and room for it."""
+    own = task.overrides.get("start.room")
+    if own is not None and own.value >= SHAPED_ROOM_M:
+        return task.model_copy(update={"approach": SHAPED})
     room = settings_of({"start.room": SHAPED_ROOM_M}, "room for a shaped approach")
-    return task.model_copy(update={"approach": SHAPED, "overrides": {**room, **task.overrides}})
+    return task.model_copy(update={"approach": SHAPED, "overrides": {**task.overrides, **room}})
 
 
 def _rates(flown: Sequence[Outcomes]) -> Rates:
     landed, spotless = (np.concatenate([rate(outcomes) for outcomes in flown]) for rate in (four_leg, clean))
-    return Rates(share_of(landed), share_of(spotless))
+    return Rates(share_of(landed), share_of(spotless), None, landed.size)
+
+
+def _rates_of_vehicles(flown: Sequence[Outcomes]) -> Rates:
+    """Flights of one vehicle are alike, so the vehicles count for the intervals, not the flights."""
+    shares = np.array([[rate(outcomes).mean() for outcomes in flown] for rate in (four_leg, clean)])
+    landed, spotless = (_mean_over_vehicles(of) for of in shares)
+    worst = np.sort(shares[0])[: -(-shares.shape[1] // 10)]
+    return Rates(landed, spotless, float(worst.mean()), sum(outcomes.size for outcomes in flown))
+
+
+def _mean_over_vehicles(shares: FloatArray) -> Estimate:
+    mean = float(shares.mean())
+    low, high = wilson(mean, shares.size)
+    return Estimate(mean, float(low), float(high), shares.size)
 
 
 def _go(general: General, places: Sequence[Place], theta: FloatArray, n: int, seed: int, threads: int | None) -> Go:

@@ -7,8 +7,11 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from ivl import family
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy.region import Approaches
+from ivl.seeds import Purpose, derive
+from ivl.settings import Strict
 from ivl.task import Setup
 from ivl.world import World
 
@@ -21,9 +24,16 @@ class PolicyTask(Setup):
     gear: str = Field(description="Landing gear; see `ivl list gears`.")
 
 
+class Family(Strict):
+    """Vehicles that are drawn in place of the one of each task; see `ivl.family`."""
+
+    n_vehicles: int = Field(ge=1, le=1000, description="vehicles of each task")
+    seed: int = Field(default=0, ge=0, lt=2**63)
+
+
 @dataclass(frozen=True)
 class Place:
-    """A task with its world, which is built once."""
+    """A task with its world, which is built once; the world is that of the task, or of a member of its family."""
 
     task: PolicyTask
     world: World
@@ -32,6 +42,15 @@ class Place:
     def of(task: PolicyTask) -> "Place":
         """Build the world."""
         return Place(task, task.world_of(task.gear))
+
+    def members(self, drawn: Family, purpose: Purpose) -> list["Place"]:
+        """The same task with drawn vehicles; those of different purposes differ.
+
+        Raises:
+            ConfigError: The files of the task give no parameter a sigma.
+        """
+        worlds = family.members(self.world, drawn.n_vehicles, derive(drawn.seed, purpose))
+        return [Place(self.task, world) for world in worlds]
 
 
 def fly(

@@ -12,7 +12,7 @@ from ivl import experiment, native, yamlfile
 from ivl.errors import ConfigError, IvlError
 from ivl.experiment import Bounds, LearnerChoice, Named
 from ivl.learners import LEARNERS, make_learner
-from ivl.policy.flying import PolicyTask
+from ivl.policy.flying import Family, PolicyTask
 from ivl.policy.region import RegionField
 from ivl.policy.shape import General
 from ivl.settings import Finite, Strict, apply_setting, check_overrides, locate, parse_setting, read_mapping
@@ -74,6 +74,9 @@ class GeneralExperiment(Named):
 
     form: str = Field(default="polynomial3", description="form of the policy; see `ivl list forms`")
     tasks: list[PolicyTask] = Field(min_length=1, description="what is flown; the objective is the mean")
+    family: Family | None = Field(
+        default=None, description="vehicles drawn in place of each task's; the objective is the mean over them, too"
+    )
     regions: list[RegionField] = Field(min_length=1, description="box, plane, or limits of speed and angle")
     map: MapSettings = MapSettings()
     learner: LearnerChoice

@@ -84,7 +84,7 @@ def _numbers(judged: Assessment) -> dict[str, Any]:
         ["go / no-go: calibration error", _number(judged.go.calibration_error), ""],
         ["go / no-go: refused below a probability of", f"{judged.go.p_min:g}", ""],
     ]
-    note = f"{judged.plane.landed.n} fresh flights of each region; rates of the regions are of every approach flown."
+    note = f"{judged.plane.n_flights} fresh flights of each region; rates of the regions are of every approach flown."
     return {"head": ["", "value", "95 % interval"], "rows": rows, "note": note}
 
 

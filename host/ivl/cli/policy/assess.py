@@ -12,7 +12,7 @@ from ivl.cli.task_options import EQUIPMENT, Chosen, task_options
 from ivl.policy import assess as judging
 from ivl.policy import file
 from ivl.policy.assess import Assessment, Rates
-from ivl.policy.flying import PolicyTask
+from ivl.policy.flying import Family, PolicyTask
 
 HELP = """Judge a policy on fresh approaches that no learning has seen.
 
@@ -30,6 +30,8 @@ Examples:
       another sensor set, for a script
   ivl policy assess g.yaml --gear narrow_long --set body.inertia_yy=3.0e-5
       other legs, another inertia
+  ivl policy assess g.yaml --vehicle crazyflie21 --gear-set table1 --family 20
+      vehicles drawn from the sigmas of the files, the same approaches for each; adds the tenth of them that land least
 """
 
 
@@ -38,7 +40,10 @@ def assess(
     chosen: Chosen,
     path: Annotated[Path, typer.Argument(metavar="FILE", help="Policy file.")],
     approaches: Annotated[int, typer.Option(help="Fresh approaches of each region.", min=1, max=10_000_000)] = 2000,
-    seed: Annotated[int, typer.Option(help="Seed of approaches and noise.", min=0)] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of approaches, noise and drawn vehicles.", min=0)] = 0,
+    family: Annotated[
+        int | None, typer.Option(metavar="N", help="Draw N vehicles in place of each.", min=1, max=1000)
+    ] = None,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -50,7 +55,8 @@ def assess(
         task = yamlfile.validate(PolicyTask, data, "options")
         if task not in different:
             different.append(task)
-    found = judging.assess(policy, different, approaches, seed, threads)
+    drawn = Family(n_vehicles=family, seed=seed) if family is not None else None
+    found = judging.assess(policy, different, approaches, seed, threads, drawn)
     if as_json:
         console.print_json(found.as_dict())
     else:
@@ -75,7 +81,9 @@ def _print(found: Assessment) -> None:
 
 
 def _rates(rates: Rates) -> str:
-    return f"{_share(rates.landed)} land, {_share(rates.clean)} clean"
+    text = f"{_share(rates.landed)} land, {_share(rates.clean)} clean"
+    worst = rates.worst_tenth
+    return text if worst is None else f"{text}; of the worst tenth of the vehicles {console.percent(worst)} land"
 
 
 def _share(share: Estimate) -> str:
