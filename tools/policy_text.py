@@ -142,7 +142,8 @@ def _gears(found: Data) -> list[str]:
             "different random",
             f"numbers. *Ratio*: the policy in the same cells, on the same {cells['flights']:,} flights, over",
             "that; .97 in landings is asked.",
-            "Landed / clean.",
+            "Landed / clean. A ratio above 1 shows that the flights of the grid did not find the best of",
+            "every cell.",
         ),
         table(
             ("vehicle, gear", "flights", "box, fresh approaches", "in the cells", "best of each cell", "ratio", "met"),
