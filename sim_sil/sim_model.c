@@ -1,5 +1,6 @@
 #include "sim_model.h"
 #include "ivl_cfg_name.h"
+#include "ivl_controller.h"
 
 #include <stdio.h>
 
@@ -133,6 +134,22 @@ static double top_m(const ivl_sim_model_t *model)
     return top;
 }
 
+/// Excess of the square of the speed over its end, for each step of the speed's excess, while a rotor slows down.   [MODEL eq. 2.9, 14.6]
+static double excess_per_step(const ivl_sim_model_t *model, double excess, double end)
+{
+    const double share = model->raw.rotor_drag_share_norm, full = model->rotor_speed_max_radps;
+    return (excess + 2.0 * end) * model->raw.rotor_tau_down_s / (1.0 - share + share * (2.0 * end + excess) / full);
+}
+
+/// Time constant of an exponential that has the impulse of the thrust that fades from hover to the least lift.  By Simpson's rule over the speed.
+static double thrust_lag_s(const ivl_sim_model_t *model)
+{
+    const double kept = (double)IVL_LIFT_NORM_MIN, hover = model->rotor_speed_hover_radps, end = sqrt(kept) * hover;
+    const double whole = hover - end, sum = excess_per_step(model, 0.0, end) + 4.0 * excess_per_step(model, 0.5 * whole, end) +
+                                            excess_per_step(model, whole, end);
+    return whole / 6.0 * sum / (hover * hover * (1.0 - kept));
+}
+
 /// The flight core knows the vehicle that it flies: its copy of these numbers follows from the world's.
 static void tell_firmware(ivl_sim_model_t *model)
 {
@@ -147,8 +164,7 @@ static void tell_firmware(ivl_sim_model_t *model)
     cfg->arm_y_m = (float)raw->rotor_y_m;
     cfg->torque_per_thrust_m = (float)raw->rotor_torque_constant_m;
     cfg->motor_thrust_N_max = (float)raw->rotor_thrust_max_N;
-    // the thrust goes with the square of the speed: it falls twice as fast
-    cfg->motor_lag_s = (float)(0.5 * raw->rotor_tau_down_s);
+    cfg->motor_lag_s = (float)thrust_lag_s(model);
     // 0 tells that the supply never sags
     cfg->vbat_V_rated = (raw->battery_voltage_V > 0.0) ? (float)raw->battery_rated_voltage_V : 0.0f;
     cfg->d_touch_m = (float)(top_m(model) + raw->world_sensed_gap_offset_m);

@@ -112,12 +112,11 @@ float app_fade_into_core(app_t *app, float mean_norm, float loop_s)
         app->owner = APP_OWNER_CORE;
         ivl_handover_begin(&app->handover, app->collective_norm, mean_norm, app->cfg.handover_s, loop_s);
     }
-    // a flip is to be as commanded from its first tick
+    // a flip is to be as commanded from its first tick, and a level-out counts on its little thrust
     const ivl_phase_t phase = app->out.phase;
-    const bool        fades =
-        (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_ABORTED) || (phase == IVL_PHASE_LEVEL_OUT);
-    const float offset = ivl_handover_next(&app->handover);
-    const float added = (fades && app->out.motors_on) ? offset : 0.0f;
+    const bool        fades = (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_ABORTED);
+    const float       offset = ivl_handover_next(&app->handover);
+    const float       added = (fades && app->out.motors_on) ? offset : 0.0f;
     app->collective_norm = ivl_clamp(mean_norm + added, 0.0f, 1.0f);
     return added;
 }

@@ -258,10 +258,10 @@ CONDITION(would_not_land)
     /* the trigger */                                                                             \
     X(with, NO_POLICY,     "no_policy",     APPROACH,      no_policy,          HOLD,   DISCARDS)  \
     X(with, ONE_SHOT,      "one_shot",      APPROACH,      has_triggered,      HOLD,   SCORED)    \
+    /* the policy expects no landing, at the trigger or at the last moment; a command that is not fresh does not hold it up */ \
+    X(with, NO_GO,         "no_go",         APPROACH,      would_not_land,     LEVEL,  SCORED)    \
     X(with, NOT_FRESH,     "not_fresh",     APPROACH,      not_this_tick,      HOLD,   SCORED)    \
-    X(with, CUE,           "cue",           APPROACH,      cue_invalid,        HOLD,   SCORED)    \
-    /* the policy expects no landing, and it is the last moment to call it off */                 \
-    X(with, NO_GO,         "no_go",         APPROACH,      would_not_land,     LEVEL,  SCORED)
+    X(with, CUE,           "cue",           APPROACH,      cue_invalid,        HOLD,   SCORED)
 // clang-format on
 
 // packed into two words

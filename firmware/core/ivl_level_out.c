@@ -46,7 +46,7 @@ bool ivl_level_out_asked(const ivl_cfg_t *cfg, const ivl_state_t *state, const i
 
 void ivl_level_out_begin(ivl_state_t *state)
 {
-    // p_hold is still where the vehicle hovered before the approach
+    // p_hold is still where the approach began
     state->level = (ivl_level_t){.rises = true, .z_W_m = state->p_hold_W_m.z};
 }
 

@@ -184,6 +184,8 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
         break;
     case IVL_PHASE_APPROACH:
         memset(&state->decision, 0, sizeof state->decision);
+        // where a level-out comes back to
+        state->p_hold_W_m = sample->p_WB_m;
         ivl_approach_begin(cfg, &state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
         break;
     case IVL_PHASE_FLIP:

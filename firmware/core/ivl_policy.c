@@ -39,15 +39,17 @@ ivl_status_t ivl_policy_check(const ivl_cfg_t *cfg, const ivl_policy_t *policy)
         return IVL_ERR_FORM;
     }
     bool         good = true;
-    const float *theta = policy->theta;
+    const float *theta = policy->theta, *end = theta + policy->n;
     for (uint32_t g = 0; g < form->n_groups; g++)
     {
-        for (uint32_t i = 0; i < form->groups[g].n; i++, theta++)
+        for (uint32_t i = 0; (i < form->groups[g].n) && (theta < end); i++, theta++)
         {
             // positive form, so that NaN is refused
             good = good && (*theta >= form->groups[g].lo) && (*theta <= form->groups[g].hi);
         }
     }
+    // groups that do not reach the last parameter leave some unchecked
+    good = good && (theta == end);
     return (good && (form->moment_most_Nm(policy->theta) <= cfg->flip_moment_Nm_max)) ? IVL_OK : IVL_ERR_RANGE;
 }
 

@@ -91,9 +91,9 @@ typedef enum
     IVL_RULE_LANDED,
     IVL_RULE_NO_POLICY,
     IVL_RULE_ONE_SHOT,
+    IVL_RULE_NO_GO,
     IVL_RULE_NOT_FRESH,
     IVL_RULE_CUE,
-    IVL_RULE_NO_GO,
     IVL_RULE_COUNT
 } ivl_rule_t;
 

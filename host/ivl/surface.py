@@ -40,7 +40,7 @@ class Surface:
     velocity_W_mps: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Refuse what is no plane.
+        """Refuse values that do not describe a plane.
 
         Raises:
             ArgumentError: A component is not finite, or the normal is no unit vector.

@@ -118,7 +118,10 @@ static void test_a_go_at_the_last_moment_is_not_taken_back(void)
     fix_tick(&fix);
     assert_phase(IVL_PHASE_APPROACH, &fix);
     TEST_ASSERT_TRUE(fix.state.decision.made && fix.state.decision.go);
-    // now the policy would refuse
+    // no other policy takes the place of the one that was asked
+    const ivl_policy_t other = no_go_policy(10);
+    TEST_ASSERT_EQUAL_INT(IVL_ERR_PHASE, ivl_policy_commit(&fix.cfg, &fix.state, &other));
+    // and this one is not asked again
     fix.state.policy.theta[10] = -3.0f;
     climb(3.5f);
     assert_phase(IVL_PHASE_FLIP, &fix);
@@ -143,6 +146,32 @@ static void test_a_policy_that_always_goes_never_levels_out(void)
         assert_phase(IVL_PHASE_FLIP, &fix);
         TEST_ASSERT_TRUE(fix.state.decision.made && fix.state.decision.go);
     }
+}
+
+/// A command that makes no sense says nothing about the ceiling.
+static void test_a_bad_command_does_not_hold_up_a_no_go(void)
+{
+    approach(0.5f, -3.0f, 20.0f);
+    fix.in.v_WB_mps = ivl_vec3(0.0f, 0.0f, 3.0f);
+    fix.in.p_WB_m.z = fix.cfg.h_ceil_m - 0.5f;
+    fix.in.cmd.speed_mps = 2.0f * fix.cfg.speed_mps_max;
+    fix_tick(&fix);
+    assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+}
+
+static void test_a_level_out_comes_back_to_where_the_approach_began(void)
+{
+    // HOVER at another point, and APPROACH before the vehicle is there
+    fix_to_phase(&fix, IVL_PHASE_READY);
+    fix.in.cmd.p_hover_W_m.z = 0.1f;
+    fix_tick(&fix);
+    const ivl_policy_t policy = no_go_policy(9);
+    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix.cfg, &fix.state, &policy));
+    const float z_begin_m = fix.in.p_WB_m.z;
+    fix_request(&fix, IVL_REQUEST_APPROACH);
+    climb(2.0f);
+    assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+    TEST_ASSERT_EQUAL_FLOAT(z_begin_m, fix.state.level.z_W_m);
 }
 
 static void test_nothing_is_decided_before_the_ceiling_comes_closer(void)
@@ -268,6 +297,8 @@ int main(void)
     RUN_TEST(test_a_go_at_the_last_moment_is_not_taken_back);
     RUN_TEST(test_no_go_without_a_valid_cue_is_not_decided);
     RUN_TEST(test_a_policy_that_always_goes_never_levels_out);
+    RUN_TEST(test_a_bad_command_does_not_hold_up_a_no_go);
+    RUN_TEST(test_a_level_out_comes_back_to_where_the_approach_began);
     RUN_TEST(test_nothing_is_decided_before_the_ceiling_comes_closer);
     RUN_TEST(test_the_next_approach_decides_anew);
     RUN_TEST(test_level_out_keeps_the_margin_and_hovers_where_the_approach_began);

@@ -288,7 +288,7 @@ def test_a_run_from_before_there_was_vary_is_resumed(tmp_path: Path) -> None:
         ("vehicle=nobody", "no vehicle 'nobody'"),
         ("learner.name=ephe,boo", "vary.learner.name=boo: learner: no learner 'boo'"),
         ("n_rollouts=6,7", "vary.n_rollouts=7: budget 30 is not a multiple of n_rollouts 7"),
-        ("sensing=[[mocap]]", "vary.sensing: value ['mocap'] is no single value"),
+        ("sensing=[[mocap]]", "vary.sensing: value ['mocap'] is not a single value"),
         ("speed_mps={first: 1.0, last: fast, count: 3}", "vary.speed_mps: last: value 'fast'"),
     ],
 )

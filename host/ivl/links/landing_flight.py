@@ -2,7 +2,7 @@
 
     to the start point -> hover, policy confirmed -> approach -> (the vehicle decides) -> outcome
 
-What depends on where is flown, how the vehicle comes to the start point and who knows the outcome, is asked of a site.
+How the vehicle comes to the start point, and who knows the outcome, depends on the site.
 """
 
 import math

@@ -264,6 +264,8 @@ class Vehicle:
         aborted_by = self.aborted_by
         self.ask_for(Command(Request.ABORT), (Phase.ABORTED,), _ABORT_S)
         self.wait(lambda: self.rule in ("landed", "lost"), _DOWN_S, "landing after a no-go")
+        # the planner still has the start point: with IDLE its controller gets the motors back
+        self.stop_planner()
         self.ask_for(Command(Request.IDLE), (Phase.IDLE,), _ABORT_S)
         self.aborted_by = aborted_by
 

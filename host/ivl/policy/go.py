@@ -128,11 +128,11 @@ def choose_p_min(p: FloatArray, decided: Decided, strikes_avoided_min: float, re
     """
     tried = np.linspace(_P_MIN, _P_MAX, 97)
     refused = p[None, :] < tried[:, None]
-    n_strikes = max(int(decided.strike.sum()), 1)
-    avoided = (refused & decided.strike).sum(axis=1) / n_strikes
+    avoided = (refused & decided.strike).sum(axis=1) / max(int(decided.strike.sum()), 1)
     good = (refused & decided.landed).sum(axis=1) / decided.n_flights
     few = good <= refused_good_max
-    if not few.any():
+    # nothing to avoid, or no way to avoid it at that price: always go
+    if not few.any() or not decided.strike.any():
         return 0.0
     both = np.flatnonzero(few & (avoided >= strikes_avoided_min))
     index = both[len(both) // 2] if both.size else np.flatnonzero(few)[-1]

@@ -78,7 +78,7 @@ def run(
     on_iteration: Callable[[Iteration], None],
     threads: int | None = None,
 ) -> None:
-    """Search; `on_iteration` is told after each iteration, and keeps what is to be kept."""
+    """Search; `on_iteration` is called after each iteration, and keeps the best."""
     settings = chosen.search
     learner = make_search(chosen, general, start, best, moment_most_Nmm(places))
     series = Series(chosen.regions, chosen.seed, Purpose.SEARCH)

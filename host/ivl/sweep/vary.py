@@ -89,7 +89,7 @@ def listed(path: str, given: Any) -> list[Any]:
     given = [plain(value) for value in given]
     for value in given:
         if not isinstance(value, Value):
-            raise ValueError(f"{where}: value {value!r} is no single value")
+            raise ValueError(f"{where}: value {value!r} is not a single value")
     if 0 < sum(map(_is_number, given)) < len(given):
         raise ValueError(f"{where}: numbers and other values are mixed{_hint(given)}")
     as_float = path in native.library().params or path in ("speed_mps", "angle_deg")

@@ -18,7 +18,7 @@ from ivl.policy.learn import learn as learn_policy
 
 HELP = """Learn one policy for every approach, and write it into a file.
 
-TASK is a YAML file that says what is flown, where approaches are drawn, and how is learned; a name such as
+TASK is a YAML file that says what is flown, where approaches are drawn, and how it learns; a name such as
 experiments/general.yaml is also found inside the package. Further files add their tasks: the objective is the mean.
 Ctrl-C keeps the best so far.
 
@@ -56,6 +56,8 @@ def learn(
     """Learn a policy; HELP is the text that people see."""
     if not out.parent.is_dir():
         raise ConfigError(f"--out {out}: there is no folder {out.parent}")
+    if out.is_dir():
+        raise ConfigError(f"--out {out}: is a folder; a file is needed")
     chosen = general.load(tasks, settings or [], form=form, learner=learner, seed=seed)
     start = file.load(policy) if policy is not None else None
     with _progress() as tell:
@@ -73,7 +75,7 @@ def learn(
         for name, text in (
             ("form", f"{learned.form}, {learned.shape.n} numbers"),
             ("flights", str(training.rollouts)),
-            ("objective of the map's policy", console.number(training.start_objective, 4)),
+            ("objective at the start", console.number(training.start_objective, 4)),
             ("objective of the policy", console.number(training.objective, 4)),
             ("over the approaches that chose it", rates),
             ("go / no-go", f"no flip below a probability of {learned.theta['go_p_min'].value:g}"),

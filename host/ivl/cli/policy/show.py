@@ -127,7 +127,7 @@ def _print(policy: PolicyFile) -> None:
             _line("approaches", f"{v0:g} to {v1:g} m/s, {a0:g} to {a1:g} degrees")
         _line(
             "objective",
-            f"{console.number(t.objective, 4)} (of the map's policy {console.number(t.start_objective, 4)})",
+            f"{console.number(t.objective, 4)} (at the start {console.number(t.start_objective, 4)})",
         )
     if policy.score is not None:
         s = policy.score
