@@ -162,7 +162,7 @@ class Room:
         check_abort(vehicle)
         decision = vehicle.decision() if called_off is None else (called_off.p_land, called_off.d_decided_m)
         if aborted:
-            # it stands upright, and the planner still has the start point: with IDLE its controller gets the motors back
+            # it stands upright, and the planner still has the start point: with IDLE its controller flies again
             vehicle.stop_planner()
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         recording = vehicle.recording(policy_seq)
