@@ -48,7 +48,7 @@ def packed(page: Path) -> dict[str, Any]:
 
 def test_forms_are_listed_with_name_unit_range_and_meaning(capsys: Capture) -> None:
     listed = {entry["name"]: entry for entry in printed(capsys, "list", "forms")["forms"]}
-    assert list(listed) == ["constant", "six", "most"]
+    assert list(listed) == ["constant", "polynomial2", "polynomial3", "bilinear", "six", "most"]
     assert list(listed["six"]["parameters"]) == NAMES
     assert listed["six"]["parameters"]["flip_vz_mNs"] == {
         "unit": "mN s", "lo": -5.0, "hi": 5.0, "doc": "its change with the closing speed",

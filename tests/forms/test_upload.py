@@ -132,4 +132,4 @@ def test_a_host_without_the_form_is_told_which_there_are(six_file: Path) -> None
     done = fly_as(PRODUCT, str(six_file), "--uri", "udp://127.0.0.1:9", "--theta", "4.8,0,0,8,0,9")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert "six.yaml: policy form 'six' is unknown (allowed constant)" in line
+    assert "six.yaml: policy form 'six' is unknown (allowed constant, polynomial2" in line

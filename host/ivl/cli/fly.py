@@ -149,5 +149,6 @@ def _outcome(record: Any, end_reason: str) -> dict[str, Any]:
     result = outcome.as_dict(record[0], end_reason)
     result["four_leg"] = bool(outcome.four_leg(record)[0])
     result["clean"] = bool(outcome.clean(record)[0])
+    result["verdict"] = outcome.verdict(record[0])
     result["reward_paper"] = float(RewardChoice(name="paper").score(record)[TOTAL][0])
     return result
