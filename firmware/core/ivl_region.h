@@ -31,7 +31,7 @@ typedef struct
 bool ivl_region_knows(const ivl_cfg_t *cfg, const ivl_room_t *room);
 
 /// @param[in] p_W_m    where the change of velocity begins
-/// @param[in] v_W_mps  from which velocity; what is no number counts as 0
+/// @param[in] v_W_mps  from which velocity; finite, as the core has checked
 /// @param[in] asked    the commanded velocity, both components >= 0; its acceleration is not used
 ivl_aim_t ivl_region_aim(const ivl_cfg_t *cfg, const ivl_room_t *room, ivl_vec3_t p_W_m, ivl_vec3_t v_W_mps, ivl_aim_t asked);
 #endif  // IVL_REGION_H
