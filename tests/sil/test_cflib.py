@@ -94,10 +94,9 @@ def test_parameter_is_set_and_confirmed(sil, connected, wait_for):
 
 def test_defaults_and_persistent_values(sil, connected, wait_for):
     with connected(sil.uri) as cf:
-        persistent = [
-            f"{g}.{n}" for g, group in cf.param.toc.toc.items() for n, e in group.items() if e.is_persistent()
-        ]
-        name = persistent[0]
+        # not `supervisor.tmblChckEn`, which the app writes in every tick
+        name = "pid_rate.rateFiltEn"
+        assert cf.param.toc.get_element_by_complete_name(name).is_persistent()
         default = float(cf.param.get_value(name))
         answers: list[Any] = []
 
