@@ -1,0 +1,182 @@
+"""Emulators: what a member would record, and how often it would land, without flying it.
+
+Fitted to a bank (`ivl.belief.bank`). u are the numbers of the member and of the policy, scaled.
+
+    recording     features = A(u) + b + e; A all products of two of u, b of the member, e of the flight: ridge regression;
+                  the covariances of b (between members: what the emulator does not know) and e (equal flights) are
+                  those of its residuals
+    landing       P(landed | u): a mean of small neural networks (scikit-learn), each from its own seed
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import expit  # type: ignore[import-untyped]
+from sklearn.neural_network import MLPClassifier  # type: ignore[import-untyped]
+
+from ivl.belief import recording
+from ivl.belief.bank import Bank
+
+FloatArray = npt.NDArray[np.float64]
+
+USED = tuple(
+    name
+    for name in recording.NAMES
+    if name in ("closing", "contact_time") or name.endswith(("_050", "_090", "_130", "_170", "_210"))
+)
+"""Features that are emulated; the others say the same again."""
+_USED_INDEX = np.array([recording.NAMES.index(name) for name in USED])
+_RIDGE = 3.0
+_LEAST_SHARE, _LEAST_BETWEEN = 1e-3, 0.01
+_NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 30, 0.3
+
+
+def used(features: FloatArray) -> FloatArray:
+    """The emulated features of recordings, shape (..., len(USED))."""
+    return np.asarray(features[..., _USED_INDEX])
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What is known of a flight, as numbers of size one: the policy, and the battery's voltage where there is one."""
+
+    lo: FloatArray
+    hi: FloatArray
+    battery_V: float
+    battery_sigma_V: float
+
+    @staticmethod
+    def of(bank: Bank, bounds: FloatArray) -> "Scale":
+        """Of a bank; without a battery its number is 0."""
+        volts = bank.features[..., recording.BATTERY]
+        seen = np.isfinite(volts)
+        if not seen.any():
+            return Scale(bounds[:, 0], bounds[:, 1], 0.0, 1.0)
+        return Scale(bounds[:, 0], bounds[:, 1], float(volts[seen].mean()), float(volts[seen].std()))
+
+    def __call__(self, theta: FloatArray, battery_V: FloatArray | None = None) -> FloatArray:
+        """Policies, shape (n, dim), with voltages, shape (n,), as shape (n, dim + 1); NaN: the mean voltage."""
+        battery = np.zeros(len(theta)) if battery_V is None else (battery_V - self.battery_V) / self.battery_sigma_V
+        policy = 4.0 * (theta - self.lo) / (self.hi - self.lo) - 2.0
+        return np.concatenate([policy, np.where(np.isfinite(battery), battery, 0.0)[:, None]], axis=1)
+
+
+@dataclass(frozen=True)
+class RecordingEmulator:
+    """Mean and covariances of recordings.
+
+    Attributes:
+        weights: Of the terms, shape (n_terms, n_used).
+        within: Covariance of e, shape (n_used, n_used).
+        between: Covariance of b, shape (n_used, n_used).
+    """
+
+    scale: Scale
+    weights: FloatArray
+    within: FloatArray
+    between: FloatArray
+
+    def mean(self, z: FloatArray, theta: FloatArray, battery_V: FloatArray) -> FloatArray:
+        """Expected features of members z, shape (n, d), in flights, shape (n, ...): shape (n, n_used)."""
+        return _terms(z, self.scale(theta, battery_V)) @ self.weights
+
+
+def _terms(z: FloatArray, s: FloatArray) -> FloatArray:
+    """One, all of u, all products of two, and the cubes of the policy."""
+    u = np.concatenate([z, s], axis=1)
+    i, j = np.triu_indices(u.shape[1])
+    return np.concatenate([np.ones((len(u), 1)), u, u[:, i] * u[:, j], s**3], axis=1)
+
+
+def fit_recordings(bank: Bank, scale: Scale) -> RecordingEmulator:
+    """Ridge regression on the recordings of a bank."""
+    n, k = bank.features.shape[:2]
+    z = np.repeat(bank.z, k, axis=0)
+    theta = bank.theta[:, :k].reshape(n * k, -1)
+    y = used(bank.features).reshape(n * k, -1)
+    x = _terms(z, scale(theta, bank.features[..., recording.BATTERY].reshape(n * k)))
+    weights = np.zeros((x.shape[1], y.shape[1]))
+    for column in range(y.shape[1]):
+        seen = np.isfinite(y[:, column])
+        a = x[seen]
+        weights[:, column] = np.linalg.solve(a.T @ a + _RIDGE * np.eye(a.shape[1]), a.T @ y[seen, column])
+    residual = (y - x @ weights).reshape(n, k, -1)
+    within, between = _covariances(residual)
+    return RecordingEmulator(scale, weights, within, between)
+
+
+def _covariances(residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Covariance within members and between them, of residuals with gaps, shape (n, k, q)."""
+    seen = np.isfinite(residual)
+    count = seen.sum(axis=1)
+    mean = np.where(seen, residual, 0.0).sum(axis=1) / np.maximum(count, 1)
+    inner = np.where(seen, residual - mean[:, None], 0.0)
+    pairs = np.einsum("nka,nkb->ab", seen.astype(float), seen.astype(float))
+    lost = np.einsum("na,nb->ab", (count > 0).astype(float), (count > 0).astype(float))
+    within = np.einsum("nka,nkb->ab", inner, inner) / np.maximum(pairs - lost, 1.0)
+    rich = count >= np.maximum(2, residual.shape[1] // 3)
+    outer = np.where(rich, mean, 0.0)
+    number = np.einsum("na,nb->ab", rich.astype(float), rich.astype(float))
+    average = np.einsum("na,nb->ab", rich / np.maximum(count, 1), rich.astype(float)) / np.maximum(number, 1.0)
+    between = np.einsum("na,nb->ab", outer, outer) / np.maximum(number, 1.0) - within * np.minimum(average, average.T)
+    least = _LEAST_BETWEEN * np.diag(within)
+    return _positive(within, np.diag(within)), _positive(between, np.maximum(np.diag(between), least))
+
+
+def _positive(matrix: FloatArray, variance: FloatArray) -> FloatArray:
+    """A covariance with these variances near an estimate with gaps, which may be none."""
+    spread = np.sqrt(variance)
+    correlation = np.clip(matrix / np.outer(spread, spread), -1.0, 1.0)
+    np.fill_diagonal(correlation, 1.0)
+    values, vectors = np.linalg.eigh(correlation)
+    values = np.maximum(values, _LEAST_SHARE * values.max())
+    return np.asarray((vectors * values) @ vectors.T * np.outer(spread, spread))
+
+
+@dataclass(frozen=True)
+class LandingEmulator:
+    """Landing rate of members with policies."""
+
+    recordings: RecordingEmulator
+    centre: FloatArray
+    spread: FloatArray
+    nets: Sequence[Sequence[tuple[FloatArray, FloatArray]]]
+
+    def inputs(self, z: FloatArray, theta: FloatArray, battery_V: FloatArray) -> FloatArray:
+        """Member, flight, and what it is expected to record: the motion decides the landing."""
+        s = self.recordings.scale(theta, battery_V)
+        expected = (self.recordings.mean(z, theta, battery_V) - self.centre) / self.spread
+        return np.concatenate([z, s, s[:, :-1] ** 2, expected], axis=1)
+
+    def rate(self, z: FloatArray, theta: FloatArray, battery_V: FloatArray) -> FloatArray:
+        """P(landed), shape (n,), of members z, shape (n, d), in flights, shape (n, ...)."""
+        u = self.inputs(z, theta, battery_V).astype(np.float32)
+        total = np.zeros(len(u))
+        for net in self.nets:
+            h = u
+            for number, (weight, bias) in enumerate(net):
+                h = h @ weight + bias
+                if number + 1 < len(net):
+                    h = np.maximum(h, 0.0)
+            total += expit(h[:, 0].astype(np.float64))
+        return np.asarray(total / len(self.nets))
+
+
+def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> LandingEmulator:
+    """Neural networks on the landings of a bank."""
+    n, m = bank.landed.shape
+    flights = (
+        np.repeat(bank.z, m, axis=0), bank.theta.reshape(n * m, -1), bank.features[..., recording.BATTERY].reshape(n * m)
+    )  # fmt: skip
+    expected = recordings.mean(*flights)
+    emulator = LandingEmulator(recordings, expected.mean(axis=0), expected.std(axis=0), [])
+    x, y = emulator.inputs(*flights), bank.landed.ravel()
+    nets = []
+    for number in range(_NETS):
+        net = MLPClassifier(_HIDDEN, alpha=_PENALTY, batch_size=400, learning_rate_init=2e-3, random_state=seed + number)
+        for _ in range(_EPOCHS):
+            net.partial_fit(x, y, classes=[False, True])
+        nets.append([(w.astype(np.float32), b.astype(np.float32)) for w, b in zip(net.coefs_, net.intercepts_, strict=True)])
+    return LandingEmulator(recordings, emulator.centre, emulator.spread, nets)

@@ -1,0 +1,114 @@
+"""What a flight records of its flip, as a vector of features that simulated and real flights share.
+
+    pitch, rate, fall     at `TIMES_S` after the trigger, up to the first contact
+    at_contact            time after the trigger, pitch, rate and fall at the first contact
+    closing               closing speed just before the trigger
+    battery               battery voltage in the hover before the approach
+
+Pitch is the nose-up rotation since level (degrees), rate the nose-up rate of the gyro (rad/s, clipped where it clips),
+fall the sensed distance that was lost since the trigger (m). What a flight does not have is NaN: samples after the
+contact, all of them without a trigger.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from ivl.flight.motion import Flip
+from ivl.world import Trace, World
+
+FloatArray = npt.NDArray[np.float64]
+
+TIMES_S = np.arange(0.03, 0.231, 0.02)
+SIGNALS = ("pitch", "rate", "fall")
+AT_CONTACT = ("contact_time", "contact_pitch", "contact_rate", "contact_fall")
+NAMES = (
+    *(f"{signal}_{round(1000 * t):03d}" for signal in SIGNALS for t in TIMES_S), *AT_CONTACT, "closing", "battery",
+)  # fmt: skip
+N = len(NAMES)
+BATTERY = NAMES.index("battery")
+
+_CLOSING_BEFORE_S = 0.02
+_LAST_S = 0.24
+_TRACE_PERIOD_S = 0.005
+_GYRO_FULL_RADPS = 34.9
+"""Full scale of the gyro (Bosch BMI088 data sheet); rates are compared up to `_CLIP_SHARE` of it."""
+_CLIP_SHARE = 0.93
+_ATTITUDE_DEG, _CONTACT_S, _BATTERY_V = 0.3, 0.002, 0.01
+"""Assumed errors of a recorded attitude, of the time of the first contact as a recorder at 500 Hz gives it, and of a
+voltage that was averaged over a hover."""
+
+
+def simulated(
+    world: World, approach: tuple[float, float], theta: FloatArray, stream: int, seed: int, **flight: str
+) -> tuple[FloatArray, npt.NDArray[np.void]]:
+    """Fly one rollout and record it as a vehicle does.
+
+    Args:
+        world: The vehicle.
+        approach: Speed (m/s) and angle (degrees).
+        theta: Policy, shape (dim,).
+        stream: Number of the rollout.
+        seed: Seed of the rollout; its recording has noise of the same seed and stream.
+        **flight: `form` and `start` of the rollout.
+
+    Returns:
+        Features, shape (N,), and the outcome record.
+    """
+    trace = world.trace(*approach, *theta.tolist(), seed=seed, stream=stream, period_s=_TRACE_PERIOD_S, **flight)  # type: ignore[arg-type]
+    rng = np.random.Generator(np.random.PCG64([seed, stream]))
+    return of_trace(world, trace, rng), trace.outcome
+
+
+def of_trace(world: World, trace: Trace, rng: np.random.Generator) -> FloatArray:
+    """Features of a simulated flight, shape (N,), with the noise of a recording."""
+    outcome, rows = trace.outcome, trace.rows
+    if not outcome["triggered"]:
+        return np.full(N, np.nan)
+    t_s = rows["t_s"] - float(outcome["t_trigger_s"])
+    at = int(np.searchsorted(t_s, 0.0))
+    sense = world.params.values
+    n = len(t_s)
+    pitch = np.rad2deg(np.unwrap(np.deg2rad(rows["pitch_deg"])))
+    pitch = pitch - 360.0 * np.round(pitch[at] / 360.0) + rng.normal(0.0, _ATTITUDE_DEG, n)
+    rate = -rows["w_B_radps"][:, 1] + rng.normal(0.0, max(sense["sense.gyro_noise"], 1e-3), n)
+    fall = rows["d_sensed_m"][at] - rows["d_sensed_m"]
+    closing = -np.gradient(rows["d_ceil_m"], rows["t_s"]) + rng.normal(0.0, max(sense["sense.velocity_noise"], 1e-3), n)
+    contact_s = float(outcome["t_impact_s"]) - float(outcome["t_trigger_s"]) + rng.normal(0.0, _CONTACT_S)
+    has_battery = sense["battery.voltage"] > 0.0
+    battery_V = float(rows["battery_V"][0]) + rng.normal(0.0, _BATTERY_V) if has_battery else np.nan
+    return _features(t_s, pitch, rate, fall, closing, contact_s, battery_V)
+
+
+def of_flip(flip: Flip, h_plane_m: float) -> FloatArray:
+    """Features of a recorded flight, shape (N,)."""
+    distance = h_plane_m - np.concatenate([[float(np.asarray(flip.state.p_W_m)[2])], flip.height_m])
+    t_s = np.concatenate([[0.0], flip.t_s])
+    pitch0 = float(np.rad2deg(2.0 * np.arctan2(-np.asarray(flip.state.q_WB)[1], np.asarray(flip.state.q_WB)[3])))
+    pitch = np.concatenate([[pitch0], flip.pitch_deg])
+    rate = np.concatenate([[-float(np.asarray(flip.state.w_B_radps)[1])], flip.rate_radps])
+    closing = np.full(len(t_s), float(np.asarray(flip.state.v_W_mps)[2]))
+    return _features(t_s, pitch, rate, distance[0] - distance, closing, flip.t_contact_s, np.nan)
+
+
+def _features(
+    t_s: FloatArray, pitch: FloatArray, rate: FloatArray, fall: FloatArray, closing: FloatArray, contact_s: float,
+    battery_V: float,
+) -> FloatArray:
+    """Signals at the times of the features; NaN after the contact and after the end of the recording."""
+    end_s = contact_s if np.isfinite(contact_s) else _LAST_S
+    seen = TIMES_S <= min(end_s, float(t_s[-1]))
+    clip = _CLIP_SHARE * _GYRO_FULL_RADPS
+    signals = (pitch, np.clip(rate, -clip, clip), fall)
+    at_times = [np.where(seen, np.interp(TIMES_S, t_s, signal), np.nan) for signal in signals]
+    at_contact = np.full(len(AT_CONTACT), np.nan)
+    if np.isfinite(contact_s) and contact_s <= t_s[-1]:
+        at_contact = np.array([contact_s, *(float(np.interp(contact_s, t_s, signal)) for signal in signals)])
+    before = float(np.interp(-_CLOSING_BEFORE_S, t_s, closing))
+    return np.concatenate([*at_times, at_contact, [before, battery_V]])
+
+
+def table(features: FloatArray) -> Mapping[str, float]:
+    """Features by name, NaN left out."""
+    return {name: float(value) for name, value in zip(NAMES, features, strict=True) if np.isfinite(value)}
