@@ -1,30 +1,34 @@
 """The bank: simulated members of a family, with policies flown by each, made once for a task and cached.
 
 Every flight of the bank has its own policy. A first part of the members flies policies from the whole box; the others
-fly near policies that landed, too, since a landing window is a small share of the box. Some flights of each member are
-recorded (`ivl.belief.recording`). A bank depends on its task, its family and its seed alone.
+fly near policies that landed, too, since a landing window is a small share of the box. Every flight is recorded
+(`ivl.belief.recording`). A bank depends on its task, its family and its seed alone.
 """
 
-import hashlib
-import json
 import os
+import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from ivl import native
 from ivl.belief import recording
-from ivl.errors import StoreError
+from ivl.belief.recording import Flight
 from ivl.family import Family
 from ivl.outcome import four_leg, valid
+from ivl.world import World
 
 FloatArray = npt.NDArray[np.float64]
 
+Progress = Callable[[int, int], None]
+
 VERSION = 1
+"""Of what a bank is made of; a cached one of another version is not used."""
+SPREAD = 1.3
 _BROAD = 0.25
 """Share of the members that fly policies from the whole box."""
 _NEAR, _JITTER = 0.7, 0.06
@@ -32,33 +36,14 @@ _NEAR, _JITTER = 0.7, 0.06
 
 
 @dataclass(frozen=True)
-class Flight:
-    """What all flights of a bank have in common.
-
-    Attributes:
-        speed_mps: Approach speed.
-        angle_deg: Approach angle.
-        form: Form of the policy.
-        start: How a rollout begins.
-        bounds: Box of the policies, shape (dim, 2).
-    """
-
-    speed_mps: float
-    angle_deg: float
-    form: str
-    start: str
-    bounds: FloatArray
-
-
-@dataclass(frozen=True)
 class Bank:
-    """Members and what they flew; n members with m flights each, of which the first k are recorded.
+    """Members and what they flew; n members with m flights each.
 
     Attributes:
-        z: Members, shape (n, n_dimensions).
+        z: Members, shape (n, n_dimensions), in standard deviations of the family.
         theta: Policies, shape (n, m, dim).
         landed: Whether a flight landed on three legs or more, shape (n, m).
-        features: Recordings, shape (n, k, recording.N).
+        features: Recordings, shape (n, m, recording.N).
     """
 
     z: FloatArray
@@ -66,72 +51,86 @@ class Bank:
     landed: npt.NDArray[np.bool_]
     features: FloatArray
 
+    def save(self, path: Path) -> None:
+        """Write to a file; a reader never sees half of it."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
+            np.savez_compressed(file, z=self.z, theta=self.theta, landed=self.landed, features=self.features)
+        os.replace(file.name, path)
+
+    @staticmethod
+    def load(path: Path) -> "Bank":
+        """Read what `save` wrote."""
+        with np.load(path, allow_pickle=False) as data:
+            return Bank(data["z"], data["theta"], data["landed"], data["features"])
+
 
 def make(
     kin: Family,
     flight: Flight,
     n_members: int,
     n_flights: int,
-    n_recorded: int,
     seed: int,
     threads: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> Bank:
     """Fly a bank.
 
     Args:
-        kin: The family.
+        kin: The family; members are drawn `SPREAD` times as wide as it is, since the vehicle that flies may be rare.
         flight: What is flown.
         n_members: Members.
         n_flights: Flights of each member.
-        n_recorded: How many of them are recorded.
         seed: Of members, policies and flights.
         threads: Worker threads; omitted: all processors.
         progress: Called with (members done, members).
     """
+    wide = replace(kin, scale=SPREAD * kin.scale)
     rng = np.random.Generator(np.random.PCG64(seed))
-    drawn = [kin.draw(rng) for _ in range(n_members)]
+    drawn = [wide.draw(rng) for _ in range(n_members)]
+    theta, near, pick = _policies(rng, flight.bounds, n_members, n_flights)
     n_broad = max(1, round(_BROAD * n_members))
-    lo, hi = flight.bounds.T
-    theta = rng.uniform(lo, hi, (n_members, n_flights, len(lo)))
-    jitter = rng.standard_normal(theta.shape) * _JITTER * (hi - lo)
-    near = rng.random((n_members, n_flights)) < _NEAR
-    pick = rng.random((n_members, n_flights))
-    workers = threads or len(os.sched_getaffinity(0))
-    results = []
-    with ThreadPoolExecutor(workers) as pool:
-        pool_of_landings: FloatArray = np.empty((0, len(lo)))
+    results: list[tuple[npt.NDArray[np.bool_], FloatArray]] = []
+    with ThreadPoolExecutor(threads or len(os.sched_getaffinity(0))) as pool:
         for first, last in ((0, n_broad), (n_broad, n_members)):
-            if len(pool_of_landings):
-                chosen = pool_of_landings[(pick * len(pool_of_landings)).astype(int)]
-                moved = np.clip(chosen + jitter, lo, hi)
-                theta[first:last] = np.where(near[..., None], moved, theta)[first:last]
-            jobs = [pool.submit(_fly, drawn[i][1], flight, theta[i], n_recorded, _member_seed(seed, i)) for i in range(first, last)]
-            for job in jobs:
-                results.append(job.result())
+            landings = np.concatenate([t[r[0]] for t, r in zip(theta, results, strict=False)]) if results else None
+            if landings is not None and len(landings):
+                chosen = landings[(pick[first:last] * len(landings)).astype(np.intp)]
+                moved = np.clip(chosen + near[first:last], *flight.bounds.T)
+                theta[first:last] = np.where(np.isfinite(moved), moved, theta[first:last])
+            seeds = [derive_member(seed, i) for i in range(first, last)]
+            worlds = [drawn[i][1] for i in range(first, last)]
+            for result in pool.map(partial(_fly, flight), worlds, theta[first:last], seeds):
+                results.append(result)
                 if progress:
                     progress(len(results), n_members)
-            pool_of_landings = np.concatenate([t[r[0]] for t, r in zip(theta, results, strict=False)])
-    return Bank(
-        np.array([z for z, _ in drawn]), theta, np.array([r[0] for r in results]), np.array([r[1] for r in results])
-    )
+    z = SPREAD * np.array([z for z, _ in drawn])
+    return Bank(z, theta, np.array([r[0] for r in results]), np.array([r[1] for r in results]))
 
 
-def _member_seed(seed: int, i: int) -> int:
-    return int(np.random.SeedSequence([seed, i]).generate_state(1, np.uint64)[0] >> np.uint64(1))
+def _policies(
+    rng: np.random.Generator, bounds: FloatArray, n_members: int, n_flights: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Policies from the whole box; how far others lie from a landing, NaN for those that stay; which landing."""
+    lo, hi = bounds.T
+    shape = (n_members, n_flights)
+    theta = rng.uniform(lo, hi, (*shape, len(lo)))
+    jitter = rng.standard_normal(theta.shape) * _JITTER * (hi - lo)
+    near = np.where(rng.random(shape)[..., None] < _NEAR, jitter, np.nan)
+    return theta, near, rng.random(shape)
 
 
-def _fly(world, flight: Flight, theta: FloatArray, n_recorded: int, seed: int):  # type: ignore[no-untyped-def]
+def derive_member(seed: int, i: int) -> int:
+    """Seed of the flights of member i."""
+    return int(np.random.SeedSequence([seed, i]).generate_state(1, np.uint64)[0])
+
+
+def _fly(
+    flight: Flight, world: World, theta: FloatArray, seed: int
+) -> tuple[npt.NDArray[np.bool_], FloatArray]:
     """Landings and recordings of one member."""
-    flown = {"form": flight.form, "start": flight.start}
-    outcomes = world.rollouts(
-        flight.speed_mps, flight.angle_deg, *theta[n_recorded:].T, seed=seed,
-        stream=np.arange(n_recorded, len(theta)), threads=1, **flown,
-    )  # fmt: skip
-    features = np.full((n_recorded, recording.N), np.nan)
-    landed = np.zeros(len(theta), dtype=bool)
-    landed[n_recorded:] = four_leg(outcomes) & valid(outcomes)
-    for k in range(n_recorded):
-        features[k], outcome = recording.simulated(world, (flight.speed_mps, flight.angle_deg), theta[k], k, seed, **flown)
-        landed[k] = bool(four_leg(outcome))
+    landed, features = np.zeros(len(theta), dtype=bool), np.empty((len(theta), recording.N))
+    for k, policy in enumerate(theta):
+        features[k], outcome = recording.simulated(world, flight, policy, seed, k)
+        landed[k] = bool(valid(outcome) and four_leg(outcome))
     return landed, features

@@ -1,68 +1,120 @@
-"""What to fly and what to recommend: EPHE over rollouts imagined on the belief, with margin.
+"""Landing rates of policies over a belief, with margin, and EPHE over rollouts imagined on it.
 
-An imagined rollout is a real one of the simulator: a member drawn from the belief flies a policy drawn from
-N(mu, diag sigma^2), with the trigger early or late by `TIMING_S` and the moment off by `MOMENT`, or neither. So its
-landing rate is averaged over the belief and over the margin at once. mu and sigma follow by reward-weighted maximum
-likelihood, equations (1), (2) and (4) of `ivl.learners.ephe`, with the landing as the reward.
+What the belief expects of a policy is corrected by what flights near it did (`ivl.belief.correction`).
+
+The margin rate of a policy is its landing rate averaged over the belief, over a trigger that comes up to `TIMING_S`
+early or late, and over a moment up to `MOMENT` smaller or larger, both uniform; by Gauss-Legendre quadrature with
+three points each.
+
+EPHE on a belief: imagined rollouts theta_k ~ N(mu, diag sigma^2) have as reward r_k the landing rate of one particle
+with one timing and one moment out of the margin, and
+
+    w_k = max(0, r_k - mean(r)),   mu' = sum(w_k theta_k) / sum(w_k),   sigma'^2 = sum(w_k (theta_k - mu)^2) / sum(w_k)
+
+as in `ivl.learners.ephe` with above-mean weights about the old mean.
 """
-
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import RegularGridInterpolator  # type: ignore[import-untyped]
 
-from ivl.belief.bank import Flight
+from ivl.belief.correction import Correction
+from ivl.belief.posterior import Belief
 from ivl.learners.base import draw_truncated
-from ivl.outcome import four_leg, valid
-from ivl.world import World
 
 FloatArray = npt.NDArray[np.float64]
 
 TIMING_S, MOMENT = 0.010, 0.10
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+_N_RREV, _N_MOMENT, _N_NEAR = 57, 12, 60
+_LEAST_AHEAD_S = 1e-3
 
 
-def perturbed(theta: FloatArray, timing: FloatArray, moment: FloatArray, bounds: FloatArray) -> FloatArray:
-    """Constant policies, shape (..., 2), as if the trigger came `timing` seconds late and the moment were `moment` larger.
+def perturbed(theta: FloatArray, late_s: npt.ArrayLike, moment: npt.ArrayLike, bounds: FloatArray) -> FloatArray:
+    """Constant policies, shape (..., 2), as if the trigger came late and the moment were larger by a share.
 
-    A vehicle that closes at a constant speed reaches RREV_c at the time 1 / RREV_c before the contact.
+    A vehicle that closes at a constant speed is 1 / RREV before the contact.
     """
-    ahead_s = np.maximum(1.0 / np.maximum(theta[..., 0], 1e-3) - timing, 1e-3)
+    ahead_s = 1.0 / np.maximum(theta[..., 0], 1e-3) - np.asarray(late_s)
+    rrev_per_s = np.clip(1.0 / np.maximum(ahead_s, _LEAST_AHEAD_S), *bounds[0])
     return np.stack(
-        [np.clip(1.0 / ahead_s, *bounds[0]), np.clip(theta[..., 1] * (1.0 + moment), *bounds[1])], axis=-1
+        np.broadcast_arrays(rrev_per_s, np.clip(theta[..., 1] * (1.0 + np.asarray(moment)), *bounds[1])), axis=-1
     )
 
 
-def imagine(
-    worlds: Sequence[World], flight: Flight, mu: FloatArray, sigma: FloatArray, n_each: int, rng: np.random.Generator,
-    pool: ThreadPoolExecutor,
-) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-    """Policies, shape (n, dim), and whether they landed, shape (n,); `n_each` rollouts of each world."""
-    lo, hi = flight.bounds.T
-    n = len(worlds) * n_each
-    theta = draw_truncated(rng, mu, sigma, lo, hi, n)
-    timing, moment = rng.integers(-1, 2, n) * TIMING_S, rng.integers(-1, 2, n) * MOMENT
-    flown = perturbed(theta, timing, moment, flight.bounds)
-    seeds = rng.integers(0, 2**62, len(worlds))
-
-    def fly(i: int) -> npt.NDArray[np.bool_]:
-        own = flown[i * n_each : (i + 1) * n_each]
-        outcomes = worlds[i].rollouts(
-            flight.speed_mps, flight.angle_deg, *own.T, form=flight.form, start=flight.start, seed=int(seeds[i]), threads=1
-        )
-        return np.asarray(four_leg(outcomes) & valid(outcomes))
-
-    return theta, np.concatenate(list(pool.map(fly, range(len(worlds)))))
+def around(theta: FloatArray, bounds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The nine points of the margin of policies, shape (9, n, 2), and their weights, shape (9,)."""
+    late, moment = np.meshgrid(TIMING_S * _NODES, MOMENT * _NODES, indexing="ij")
+    points = [perturbed(theta, a, b, bounds) for a, b in zip(late.ravel(), moment.ravel(), strict=True)]
+    return np.array(points), np.outer(_WEIGHTS, _WEIGHTS).ravel() / 4.0
 
 
-def ephe_step(
-    theta: FloatArray, reward: FloatArray, mu: FloatArray, sigma: FloatArray, shrink_min: float, floor: FloatArray
+def rate(belief: Belief, corrected: Correction, theta: FloatArray) -> FloatArray:
+    """Landing rate of policies, shape (n, 2), over the belief, corrected: shape (n,)."""
+    return corrected(theta, belief.rates(theta).mean(axis=0))
+
+
+def margin_rate(belief: Belief, corrected: Correction, theta: FloatArray, bounds: FloatArray) -> FloatArray:
+    """Margin rate of policies, shape (n, 2): shape (n,)."""
+    points, weights = around(theta, bounds)
+    return np.asarray(weights @ rate(belief, corrected, points.reshape(-1, 2)).reshape(len(weights), -1))
+
+
+def safest(
+    belief: Belief, corrected: Correction, bounds: FloatArray, rng: np.random.Generator
+) -> tuple[FloatArray, float]:
+    """The policy of the largest margin rate, shape (2,), and that rate."""
+    axes = np.linspace(*bounds[0], _N_RREV), np.linspace(*bounds[1], _N_MOMENT)
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    surface = rate(belief, corrected, grid).reshape(_N_RREV, _N_MOMENT)
+    points, weights = around(grid, bounds)
+    smooth = weights @ RegularGridInterpolator(axes, surface)(points.reshape(-1, 2)).reshape(len(weights), -1)
+    best = grid[int(smooth.argmax())]
+    steps = np.array([axis[1] - axis[0] for axis in axes])
+    near = np.clip(best + 0.5 * steps * rng.standard_normal((_N_NEAR, 2)), *bounds.T)
+    near[0] = best
+    rates = margin_rate(belief, corrected, near, bounds)
+    top = int(rates.argmax())
+    return near[top], float(rates[top])
+
+
+def ephe(
+    belief: Belief,
+    corrected: Correction,
+    mu: FloatArray,
+    sigma: FloatArray,
+    bounds: FloatArray,
+    rng: np.random.Generator,
+    n: int,
+    iterations: int,
+    shrink_min: float,
+    floor: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """One update with above-mean weights about the old mean."""
-    weights = np.maximum(reward - reward.mean(), 0.0)
-    total = weights.sum()
-    if total <= 0.0:
-        return mu, sigma
-    new = weights @ theta / total
-    spread = np.sqrt(weights @ (theta - mu) ** 2 / total)
-    return new, np.maximum(spread, np.maximum(shrink_min * sigma, floor))
+    """Where EPHE goes from (mu, sigma) on imagined rollouts.
+
+    Args:
+        belief: Over vehicles.
+        corrected: By what flights did.
+        mu: Centre, shape (2,).
+        sigma: Spread, shape (2,).
+        bounds: Box of the policies, shape (2, 2).
+        rng: Of the imagined rollouts.
+        n: Imagined rollouts an iteration.
+        iterations: Updates.
+        shrink_min: Share of itself that sigma keeps at least in an update.
+        floor: Smallest sigma, shape (2,).
+    """
+    lo, hi = bounds.T
+    for _ in range(iterations):
+        theta = draw_truncated(rng, mu, sigma, lo, hi, n)
+        late, moment = rng.uniform(-TIMING_S, TIMING_S, n), rng.uniform(-MOMENT, MOMENT, n)
+        flown = perturbed(theta, late, moment, bounds)
+        reward = corrected(flown, belief.rate_of_one(flown))
+        weights = np.maximum(reward - reward.mean(), 0.0)
+        total = weights.sum()
+        if total <= 0.0:
+            break
+        spread = np.sqrt(weights @ (theta - mu) ** 2 / total)
+        mu = weights @ theta / total
+        sigma = np.clip(spread, np.maximum(shrink_min * sigma, floor), hi - lo)
+    return mu, sigma

@@ -7,35 +7,47 @@ A flight i with policy theta_i tells a recording y_i (with gaps) and whether it 
     log L_motion = -share (nu + q) / 2 log(1 + Q / nu),    share = min(1, n_full / n)                       (3)
     log L_outcome = sum log((1 - lapse) P_i + lapse / 2),  P_i = p or 1 - p                                 (4)
 
-b is what the emulator and the model get wrong of one vehicle: all its flights share it, so that equal errors of many
-flights do not add up to certainty. D is the discrepancy that is allowed to any model: it grows with time after the
-trigger. The Student-t form (3) leaves room for errors of unexpected size, its share for errors of unexpected shape.
+with W_i the rows and columns of W that flight i has, and q the number of all values. b is what the emulator and the
+model get wrong of one vehicle: all its flights share it, so that equal errors of many flights do not add up to
+certainty. D is the discrepancy that is allowed to any model; it grows with time after the trigger. The Student-t form
+(3) leaves room for errors of unexpected size, its share for errors of unexpected shape.
 
 The posterior over z (prior: standard normal, within the bounds of the family) is sampled by sequential Monte Carlo:
 particles are weighted in tempered steps, resampled, and moved by preconditioned Crank-Nicolson steps, which leave the
 prior as it is.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtri  # type: ignore[import-untyped]
 
 from ivl.belief.emulator import USED, LandingEmulator, RecordingEmulator
+from ivl.family import Family
 
 FloatArray = npt.NDArray[np.float64]
 
-_PITCH_DEG, _RATE_RADPS, _FALL_M, _AT_S, _ALIKE_S = 4.0, 0.8, 0.005, 0.2, 0.1
-_CONTACT_S, _CLOSING_MPS = 0.004, 0.03
-_MOVES, _BETA_START = 4, 0.4
-_ESS_SHARE = 0.5
+_SIZES = {"pitch": 4.0, "rate": 0.8, "fall": 0.005}
+_AT_S, _ALIKE_S = 0.2, 0.1
+_OTHERS = {"contact_time": 0.004, "closing": 0.03}
+_MOVES, _BETA_START, _BETA_MIN, _BETA_MAX, _ACCEPTED = 4, 0.4, 0.02, 0.8, 0.3
+_BETA_FACTORS = (0.3, 1.0, 1.7)
+_EFFECTIVE, _HALVINGS, _LEAST_STEP = 0.5, 20, 1e-3
+_SPARE = 8
 
 
 @dataclass(frozen=True)
 class Trust:
-    """How far flights are trusted; see equations (3) and (4)."""
+    """How far flights are trusted; see equations (1), (3) and (4).
+
+    Attributes:
+        nu: Degrees of freedom.
+        n_full: Flights whose motion counts in full; more of them count like so many.
+        lapse: Probability that an outcome says nothing.
+        discrepancy: Factor on the standard deviations of D.
+    """
 
     nu: float = 10.0
     n_full: float = 3.0
@@ -43,26 +55,9 @@ class Trust:
     discrepancy: float = 1.0
 
 
-def discrepancy(scale: float) -> FloatArray:
-    """D, shape (n_used, n_used): 4 degrees, 0.8 rad/s and 5 mm at 200 ms, growing as the square of time, smooth."""
-    sizes = {"pitch": _PITCH_DEG, "rate": _RATE_RADPS, "fall": _FALL_M}
-    n = len(USED)
-    d = np.zeros((n, n))
-    split = [(name.rsplit("_", 1)[0], float(name.rsplit("_", 1)[1]) / 1000) if name[-1].isdigit() else (name, 0.0) for name in USED]
-    for i, (a, ta) in enumerate(split):
-        for j, (b, tb) in enumerate(split):
-            if a != b:
-                continue
-            if a in sizes:
-                d[i, j] = (sizes[a] * (ta / _AT_S) ** 2) * (sizes[a] * (tb / _AT_S) ** 2) * np.exp(-abs(ta - tb) / _ALIKE_S)
-            else:
-                d[i, j] = (_CONTACT_S if a == "contact_time" else _CLOSING_MPS) ** 2
-    return scale**2 * d
-
-
-@dataclass
+@dataclass(frozen=True)
 class Evidence:
-    """Flights so far: policies, shape (n, dim), recordings, shape (n, n_used), and landings, shape (n,)."""
+    """Flights: policies, shape (n, dim), recordings (n, n_used), landings (n,), voltages in the hover (n,)."""
 
     theta: FloatArray
     features: FloatArray
@@ -70,102 +65,150 @@ class Evidence:
     battery_V: FloatArray
 
 
+def discrepancy(factor: float) -> FloatArray:
+    """D, shape (n_used, n_used): 4 degrees, 0.8 rad/s and 5 mm at 200 ms, growing as the square of time, smooth."""
+    split = [name.rpartition("_") for name in USED]
+    signal = [stem if stem in _SIZES else name for (stem, _, _), name in zip(split, USED, strict=True)]
+    time_s = np.array([float(end) / 1000.0 if stem in _SIZES else 0.0 for stem, _, end in split])
+    size = np.array(
+        [_SIZES[s] * (t / _AT_S) ** 2 if s in _SIZES else _OTHERS[s] for s, t in zip(signal, time_s, strict=True)]
+    )
+    same = np.array([[a == b for b in signal] for a in signal])
+    alike = np.where(same, np.exp(-np.abs(time_s[:, None] - time_s) / _ALIKE_S), 0.0)
+    return np.asarray(factor**2 * np.outer(size, size) * alike)
+
+
 class Belief:
     """Particles over the members of a family."""
 
     def __init__(
-        self, recordings: RecordingEmulator, landings: LandingEmulator, n_dimensions: int, inside: Callable[[FloatArray], npt.NDArray[np.bool_]],
-        n_particles: int, rng: np.random.Generator, trust: Trust,
+        self,
+        recordings: RecordingEmulator,
+        landings: LandingEmulator,
+        kin: Family,
+        n_particles: int,
+        rng: np.random.Generator,
+        trust: Trust,
     ) -> None:
-        self._recordings, self._landings, self._inside, self._trust, self._rng = recordings, landings, inside, trust, rng
-        z = rng.standard_normal((8 * n_particles, n_dimensions))
-        self.z = z[inside(z)][:n_particles]
-        self._evidence: Evidence | None = None
-        self._beta = _BETA_START
-        self._prior_b = np.linalg.inv(recordings.between + discrepancy(trust.discrepancy))
-        self._loglik = np.zeros(len(self.z))
+        """Before any flight: the family itself.
 
-    def log_likelihood(self, z: FloatArray, evidence: Evidence) -> FloatArray:
+        Args:
+            recordings: Emulator of what a flight records.
+            landings: Emulator of the landing rate.
+            kin: The family.
+            n_particles: Number of particles.
+            rng: Of everything that is drawn, also later.
+            trust: How far flights are trusted.
+        """
+        self._recordings, self._landings, self._kin, self._trust, self._rng = recordings, landings, kin, trust, rng
+        self._prior_b = np.linalg.inv(recordings.between + discrepancy(trust.discrepancy))
+        self._beta = _BETA_START
+        self.evidence: Evidence | None = None
+        self.z = np.empty((0, len(kin.dimensions)))
+        """Particles, shape (n_particles, n_dimensions)."""
+        while len(self.z) < n_particles:
+            z = rng.standard_normal((_SPARE * n_particles, len(kin.dimensions)))
+            self.z = np.concatenate([self.z, z[kin.inside(z)]])[:n_particles]
+
+    def log_likelihood(self, z: FloatArray, evidence: Evidence | None) -> FloatArray:
         """Equations (1) to (4), shape (len(z),)."""
+        if evidence is None:
+            return np.zeros(len(z))
         n, n_z = len(evidence.theta), len(z)
-        zz = np.repeat(z[:, None], n, axis=1).reshape(n_z * n, -1)
-        tt = np.tile(evidence.theta, (n_z, 1))
-        bb = np.tile(evidence.battery_V, n_z)
-        mean = self._recordings.mean(zz, tt, bb).reshape(n_z, n, -1)
-        total, v, information, q = np.zeros(n_z), np.zeros((n_z, len(USED))), self._prior_b.copy(), 0
+        flights = np.repeat(z, n, axis=0), np.tile(evidence.theta, (n_z, 1)), np.tile(evidence.battery_V, n_z)
+        mean = self._recordings.mean(*flights).reshape(n_z, n, -1)
+        p = self._landings.rate(*flights).reshape(n_z, n)
+        right = np.where(evidence.landed, p, 1.0 - p)
+        outcome = np.log((1.0 - self._trust.lapse) * right + self._trust.lapse / 2.0).sum(axis=1)
+        return np.asarray(outcome + self._motion(evidence.features[None] - mean))
+
+    def _motion(self, residual: FloatArray) -> FloatArray:
+        """Equations (2) and (3) of residuals with gaps, shape (n_z, n, n_used)."""
+        n_z, n, _ = residual.shape
+        square, v, information, q = np.zeros(n_z), np.zeros((n_z, len(USED))), self._prior_b.copy(), 0
         for i in range(n):
-            seen = np.isfinite(evidence.features[i])
+            seen = np.isfinite(residual[0, i])
             if not seen.any():
                 continue
             inverse = np.linalg.inv(self._recordings.within[np.ix_(seen, seen)])
-            r = evidence.features[i][seen] - mean[:, i, seen]
+            r = residual[:, i, seen]
             weighted = r @ inverse
-            total += np.einsum("na,na->n", weighted, r)
+            square += np.einsum("na,na->n", weighted, r)
             v[:, seen] += weighted
             information[np.ix_(seen, seen)] += inverse
             q += int(seen.sum())
-        trust = self._trust
-        result = np.zeros(n_z)
-        if q:
-            total -= np.einsum("na,na->n", v @ np.linalg.inv(information), v)
-            share = min(1.0, trust.n_full / n)
-            result -= share * 0.5 * (trust.nu + q) * np.log1p(np.maximum(total, 0.0) / trust.nu)
-        p = self._landings.rate(zz, tt, bb).reshape(n_z, n)
-        right = np.where(evidence.landed, p, 1.0 - p)
-        return np.asarray(result + np.log((1.0 - trust.lapse) * right + trust.lapse / 2).sum(axis=1))
+        if not q:
+            return np.zeros(n_z)
+        square -= np.einsum("na,na->n", v @ np.linalg.inv(information), v)
+        share, nu = min(1.0, self._trust.n_full / n), self._trust.nu
+        return np.asarray(-share * 0.5 * (nu + q) * np.log1p(np.maximum(square, 0.0) / nu))
 
     def update(self, evidence: Evidence) -> None:
         """Sample the posterior of all flights so far."""
-        old = self._loglik
-        new = self.log_likelihood(self.z, evidence)
-        done, step = 0.0, 0
+        old, new = (self.log_likelihood(self.z, e) for e in (self.evidence, evidence))
+        done = 0.0
         while done < 1.0:
-            share = self._next_share(new - old, done)
-            weights = np.exp((share - done) * (new - old) - ((share - done) * (new - old)).max())
-            chosen = self._resample(weights / weights.sum())
-            self.z, new, old = self.z[chosen], new[chosen], old[chosen]
-            done = share
-            new, old = self._move(evidence, new, old, done)
-            step += 1
-        self._evidence, self._loglik = evidence, new
+            share = _next_share(new - old, done)
+            chosen = self._resample((share - done) * (new - old))
+            self.z, new, old, done = self.z[chosen], new[chosen], old[chosen], share
+            for _ in range(_MOVES):
+                new, old = self._move(evidence, new, old, done)
+        self.evidence = evidence
 
-    def _next_share(self, gain: FloatArray, done: float) -> float:
-        """The largest step of the tempering that leaves half of the particles effective."""
-        def effective(share: float) -> float:
-            w = np.exp((share - done) * gain - ((share - done) * gain).max())
-            return float(w.sum() ** 2 / (w**2).sum())
-        if effective(1.0) >= _ESS_SHARE * len(gain):
-            return 1.0
-        lo, hi = done, 1.0
-        for _ in range(20):
-            mid = 0.5 * (lo + hi)
-            lo, hi = (mid, hi) if effective(mid) >= _ESS_SHARE * len(gain) else (lo, mid)
-        return max(lo, done + 1e-3)
+    def _resample(self, log_weights: FloatArray) -> npt.NDArray[np.intp]:
+        weights = np.exp(log_weights - log_weights.max())
+        n, cumulative = len(weights), np.cumsum(weights) / weights.sum()
+        return np.minimum(np.searchsorted(cumulative, (np.arange(n) + self._rng.random()) / n), n - 1)
 
-    def _resample(self, weights: FloatArray) -> npt.NDArray[np.intp]:
-        n = len(weights)
-        return np.minimum(np.searchsorted(np.cumsum(weights), (np.arange(n) + self._rng.random()) / n), n - 1)
+    def _move(
+        self, evidence: Evidence, new: FloatArray, old: FloatArray, done: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """One step of each particle towards the tempered posterior; log-likelihoods after and before the flights."""
+        beta = np.minimum(self._beta * self._rng.choice(_BETA_FACTORS, (len(self.z), 1)), _BETA_MAX)
+        proposal = np.sqrt(1.0 - beta**2) * self.z + beta * self._rng.standard_normal(self.z.shape)
+        to_new, to_old = (self.log_likelihood(proposal, e) for e in (evidence, self.evidence))
+        gain = (1.0 - done) * (to_old - old) + done * (to_new - new)
+        accepted = self._kin.inside(proposal) & (np.log(self._rng.random(len(gain))) < gain)
+        self.z = np.where(accepted[:, None], proposal, self.z)
+        self._beta = float(np.clip(self._beta * np.exp(accepted.mean() - _ACCEPTED), _BETA_MIN, _BETA_MAX))
+        return np.where(accepted, to_new, new), np.where(accepted, to_old, old)
 
-    def _move(self, evidence: Evidence, new: FloatArray, old: FloatArray, done: float) -> tuple[FloatArray, FloatArray]:
-        for _ in range(_MOVES):
-            beta = np.minimum(self._beta * self._rng.choice([0.3, 1.0, 1.7], (len(self.z), 1)), 0.95)
-            proposal = np.sqrt(1.0 - beta**2) * self.z + beta * self._rng.standard_normal(self.z.shape)
-            ok = self._inside(proposal)
-            before = self._evidence
-            proposed_new = self.log_likelihood(proposal, evidence)
-            proposed_old = self.log_likelihood(proposal, before) if before is not None else np.zeros(len(proposal))
-            gain = (1 - done) * (proposed_old - old) + done * (proposed_new - new)
-            accept = ok & (np.log(self._rng.random(len(gain))) < gain)
-            self.z[accept], new[accept], old[accept] = proposal[accept], proposed_new[accept], proposed_old[accept]
-            rate = accept.mean()
-            self._beta = float(np.clip(self._beta * np.exp(rate - 0.3), 0.02, 0.8))
-        return new, old
+    def rates(self, theta: FloatArray) -> FloatArray:
+        """Landing rate of policies, shape (m, dim), of each particle, shape (n_particles, m).
 
-    def rates(self, theta: FloatArray, n: int | None = None) -> FloatArray:
-        """Landing rate of policies, shape (m, dim), for each particle: shape (n, m)."""
-        z = self.z[:n]
-        zz = np.repeat(z, len(theta), axis=0)
-        scale = self._recordings.scale
-        battery = scale.battery_V + scale.battery_sigma_V * ndtri((np.arange(len(z)) + 0.5) / len(z))
-        bb = np.repeat(battery, len(theta))
-        return self._landings.rate(zz, np.tile(theta, (len(z), 1)), bb).reshape(len(z), len(theta))
+        Each particle has another voltage of the battery, spread as in the bank.
+        """
+        n, scale = len(self.z), self._recordings.scale
+        battery = scale.battery_V + scale.battery_sigma_V * ndtri((np.arange(n) + 0.5) / n)
+        flights = np.repeat(self.z, len(theta), axis=0), np.tile(theta, (n, 1)), np.repeat(battery, len(theta))
+        return self._landings.rate(*flights).reshape(n, len(theta))
+
+    def rate_of_one(self, theta: FloatArray) -> FloatArray:
+        """Landing rate of policies, shape (m, dim), each with one particle and one voltage: shape (m,)."""
+        scale, chosen = self._recordings.scale, self._rng.integers(len(self.z), size=len(theta))
+        battery = scale.battery_V + scale.battery_sigma_V * self._rng.standard_normal(len(theta))
+        return self._landings.rate(self.z[chosen], theta, battery)
+
+    def state(self) -> dict[str, Any]:
+        """Particles and step, plain data; the evidence is the learner's, the generator too."""
+        return {"z": self.z.tolist(), "beta": self._beta}
+
+    def load(self, state: dict[str, Any], evidence: Evidence | None) -> None:
+        """Inverse of `state`."""
+        self.z, self._beta, self.evidence = np.array(state["z"], dtype=np.float64), float(state["beta"]), evidence
+
+
+def _next_share(gain: FloatArray, done: float) -> float:
+    """The largest step of the tempering that leaves half of the particles effective."""
+
+    def effective(share: float) -> float:
+        weights = np.exp((share - done) * (gain - gain.max()))
+        return float(weights.sum() ** 2 / (weights**2).sum())
+
+    if effective(1.0) >= _EFFECTIVE * len(gain):
+        return 1.0
+    lo, hi = done, 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (lo + hi)
+        lo, hi = (middle, hi) if effective(middle) >= _EFFECTIVE * len(gain) else (lo, middle)
+    return max(lo, min(done + _LEAST_STEP, 1.0))

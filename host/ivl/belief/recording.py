@@ -11,6 +11,7 @@ contact, all of them without a trigger.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -40,25 +41,45 @@ _ATTITUDE_DEG, _CONTACT_S, _BATTERY_V = 0.3, 0.002, 0.01
 voltage that was averaged over a hover."""
 
 
+@dataclass(frozen=True)
+class Flight:
+    """What all flights of one task have in common.
+
+    Attributes:
+        speed_mps: Approach speed.
+        angle_deg: Approach angle.
+        form: Form of the policy.
+        start: How a rollout begins.
+        bounds: Box of the policies, shape (dim, 2), in the units of the form.
+    """
+
+    speed_mps: float
+    angle_deg: float
+    form: str
+    start: str
+    bounds: FloatArray
+
+
 def simulated(
-    world: World, approach: tuple[float, float], theta: FloatArray, stream: int, seed: int, **flight: str
-) -> tuple[FloatArray, npt.NDArray[np.void]]:
+    world: World, flight: Flight, theta: FloatArray, seed: int, stream: int
+) -> tuple[FloatArray, np.record]:
     """Fly one rollout and record it as a vehicle does.
 
     Args:
         world: The vehicle.
-        approach: Speed (m/s) and angle (degrees).
+        flight: What is flown.
         theta: Policy, shape (dim,).
-        stream: Number of the rollout.
-        seed: Seed of the rollout; its recording has noise of the same seed and stream.
-        **flight: `form` and `start` of the rollout.
+        seed: Seed of the rollout and of the noise of its recording.
+        stream: Number of the rollout within the seed.
 
     Returns:
         Features, shape (N,), and the outcome record.
     """
-    trace = world.trace(*approach, *theta.tolist(), seed=seed, stream=stream, period_s=_TRACE_PERIOD_S, **flight)  # type: ignore[arg-type]
-    rng = np.random.Generator(np.random.PCG64([seed, stream]))
-    return of_trace(world, trace, rng), trace.outcome
+    trace = world.trace(
+        flight.speed_mps, flight.angle_deg, *theta.tolist(), form=flight.form, start=flight.start,
+        seed=seed, stream=stream, period_s=_TRACE_PERIOD_S,
+    )  # fmt: skip
+    return of_trace(world, trace, np.random.Generator(np.random.PCG64([seed, stream]))), trace.outcome
 
 
 def of_trace(world: World, trace: Trace, rng: np.random.Generator) -> FloatArray:

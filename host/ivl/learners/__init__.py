@@ -13,6 +13,7 @@ from ivl.learners.base import Learner, Options, Result
 from ivl.learners.bo import BOLearner
 from ivl.learners.cma_learner import CMALearner
 from ivl.learners.ephe import EPHE, RobustEPHE
+from ivl.learners.ephe_belief import EpheBelief
 from ivl.learners.ephe_memory import EpheMemory
 from ivl.learners.fixed import Fixed
 
@@ -22,6 +23,7 @@ __all__ = [
     "BOLearner",
     "CMALearner",
     "Entry",
+    "EpheBelief",
     "EpheMemory",
     "Fixed",
     "Learner",
@@ -52,6 +54,7 @@ LEARNERS: dict[str, Entry] = {
         {"n_best": 2},
     ),
     "ephe_robust": Entry(RobustEPHE, "EPHE with above-mean weights and a limit on how fast sigma may shrink"),
+    "ephe_belief": Entry(EpheBelief, "EPHE on a belief over simulated vehicles: fewest failed landings on an unknown vehicle"),
     "ephe_memory": Entry(EpheMemory, "EPHE on rollouts imagined from a memory of all that was flown"),
     "cmaes": Entry(CMALearner, "CMA-ES of the cmaes package"),
     "cmaes_lr": Entry(CMALearner, "CMA-ES of the cmaes package with learning-rate adaptation", {"lr_adapt": True}),

@@ -29,6 +29,8 @@ FloatArray = npt.NDArray[np.float64]
 Meta = Mapping[str, npt.NDArray[Any]]
 LANDED = "landed"
 """Name in `Meta` under which a learner is told which rollouts were landings (`ivl.outcome.four_leg`)."""
+RECORDING = "recording"
+"""Name in `Meta` of what rollouts recorded of their flip, shape (n, `ivl.belief.recording.N`), NaN where nothing."""
 
 
 class Options(BaseModel):
@@ -61,6 +63,8 @@ class Learner(ABC):
 
     Options: ClassVar[type[Options]] = Options
     needs_bounds: ClassVar[bool] = False
+    uses_simulator: ClassVar[bool] = False
+    """Whether it can begin with simulated vehicles (`begin`), and wants to be told `RECORDING`."""
 
     def __init__(
         self,

@@ -1,0 +1,177 @@
+"""EPHE on a belief over simulated vehicles: the learner for a vehicle that was never simulated exactly.
+
+Before the first flight the belief is the family of the task. Each flight tells what it recorded of its flip and whether
+it landed; the belief follows (`ivl.belief.posterior`). mu and sigma follow by EPHE over rollouts imagined on the belief
+(`ivl.belief.decide`). Flown first, and recommended, is the policy of the largest margin rate; further flights of an
+episode are drawn from N(mu, diag sigma^2).
+
+A simulated family may be wrong. What no member explains is learned from outcomes by a local correction of the expected
+landing rate (`ivl.belief.correction`). The learner watches whether flights land as often as was expected of them,
+
+    surprise = sum(landed_i - p_i) / sqrt(sum p_i (1 - p_i)),    p_i what was expected before flight i,
+
+and while the surprise is below `alarm` it says that no member fits and trusts outcomes more: the correction may be
+`wide` times as large. Without a simulator it is EPHE with a memory (`ivl.learners.ephe_memory`).
+"""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from ivl.belief import correction, decide, emulator, recording
+from ivl.belief.posterior import Belief, Evidence, Trust
+from ivl.belief.simulator import Simulator
+from ivl.learners.base import LANDED, RECORDING, FloatArray, Meta, Options, draw_truncated
+from ivl.learners.ephe_memory import EpheMemory, EpheMemoryOptions
+
+_P_MIN = 0.02
+
+
+class EpheBeliefOptions(EpheMemoryOptions):
+    """Options of EPHE on a belief, beside those of EPHE with a memory."""
+
+    n_particles: int = Field(default=128, ge=16, le=5000, description="particles of the belief")
+    lapse: float = Field(default=0.05, ge=0, lt=1, description="probability that an outcome says nothing")
+    alarm: float = Field(default=-2.2, lt=0, description="sum of surprises below which the belief is given up")
+    local: float = Field(default=1.0, gt=0, le=10, description="size of the local correction, in logits")
+    wide: float = Field(default=3.0, ge=1, le=10, description="factor on that size while the alarm is on")
+    length: float = Field(default=0.2, gt=0, le=10, description="its lengths, in units of sigma0")
+    discrepancy: float = Field(default=1.0, ge=0, le=10, description="factor on the errors allowed to any model")
+
+
+class EpheBelief(EpheMemory):
+    """EPHE over rollouts imagined on a belief over vehicles; without a simulator EPHE with a memory."""
+
+    Options: ClassVar[type[Options]] = EpheBeliefOptions
+    uses_simulator: ClassVar[bool] = True
+    options: EpheBeliefOptions
+
+    def _setup(self) -> None:
+        super()._setup()
+        self._belief: Belief | None = None
+        self._theta, self._features = np.empty((0, self.dim)), np.empty((0, len(emulator.USED)))
+        self._told, self._battery_V, self._foreseen = np.empty(0, dtype=bool), np.empty(0), np.empty(0)
+
+    def begin(self, simulator: Simulator) -> None:
+        """Start from simulated vehicles; before the first `ask` or `load_state_dict`."""
+        trust = Trust(lapse=self.options.lapse, discrepancy=self.options.discrepancy)
+        self._belief = simulator.belief(self._rng, self.options.n_particles, trust)
+        self._bounds = np.stack([self.lo, self.hi], axis=1)
+        self._imagined = (self.mu0, self.sigma0)
+        self._decide()
+
+    @property
+    def model_fits(self) -> bool | None:
+        """Whether flights land as often as the belief expects; None without a belief."""
+        return None if self._belief is None else not self.surprise < self.options.alarm
+
+    @property
+    def surprise(self) -> float:
+        """See the module's text; 0 before the first flight."""
+        p = np.clip(self._foreseen, _P_MIN, 1.0 - _P_MIN)
+        return float((self._told - p).sum() / np.sqrt((p * (1.0 - p)).sum())) if len(p) else 0.0
+
+    def _ask(self, n: int) -> FloatArray:
+        if self._belief is None:
+            return super()._ask(n)
+        drawn = draw_truncated(self._rng, *self._imagined, self.lo, self.hi, n - 1)
+        return np.vstack([self._choice, drawn])
+
+    def _update(self, theta: FloatArray, rewards: FloatArray, meta: Meta, /) -> None:
+        if self._belief is None:
+            super()._update(theta, rewards, meta)
+            return
+        self._remember(theta, rewards, meta)
+        self._belief.update(self._evidence())
+        self._decide()
+
+    def _decide(self) -> None:
+        """The correction, the policy of the largest margin rate, and (mu, sigma)."""
+        assert self._belief is not None  # noqa: S101  (only asked with one)
+        options = self.options
+        size = options.local * (1.0 if self.model_fits else options.wide)
+        expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)
+        self._corrected = correction.fit(self._theta, self._told, expected, options.length * self.sigma0, size)
+        self._choice, self._margin_rate = decide.safest(self._belief, self._corrected, self._bounds, self._rng)
+        self._imagined = self._imagine_on_belief(*self._imagined)
+
+    def _remember(self, theta: FloatArray, rewards: FloatArray, meta: Meta) -> None:
+        """Add flights to the evidence, with what was expected of them."""
+        assert self._belief is not None  # noqa: S101
+        features = np.asarray(meta.get(RECORDING, np.full((len(rewards), recording.N), np.nan)), dtype=np.float64)
+        landed = meta[LANDED].astype(bool) if LANDED in meta else rewards > rewards.max() / 2.0
+        self._foreseen = np.append(self._foreseen, decide.rate(self._belief, self._corrected, theta))
+        self._theta = np.vstack([self._theta, theta])
+        self._features = np.vstack([self._features, emulator.used(features)])
+        self._battery_V = np.append(self._battery_V, features[:, recording.BATTERY])
+        self._told = np.append(self._told, landed)
+
+    def _evidence(self) -> Evidence:
+        return Evidence(self._theta, self._features, self._told, self._battery_V)
+
+    def _imagine_on_belief(self, mu: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """EPHE from where it stands; from the belief's best policy where that is expected to land more often."""
+        assert self._belief is not None  # noqa: S101
+        options, floor = self.options, self.options.floor * self.sigma0
+        starts = [(mu, np.maximum(sigma, 0.5 * self.sigma0)), (self._choice, 0.5 * self.sigma0)]
+        found = [
+            decide.ephe(
+                self._belief, self._corrected, *start, self._bounds, self._rng, options.n_imagined, options.iterations,
+                options.shrink_min, floor,
+            )
+            for start in starts
+        ]  # fmt: skip
+        rates = decide.margin_rate(self._belief, self._corrected, np.array([mu for mu, _ in found]), self._bounds)
+        return found[int(rates.argmax())]
+
+    def _distribution(self) -> tuple[FloatArray, FloatArray]:
+        return self._imagined if self._belief is not None else super()._distribution()
+
+    def _recommended(self) -> FloatArray:
+        return self._choice if self._belief is not None else super()._recommended()
+
+    def _state(self) -> dict[str, Any]:
+        state = super()._state()
+        if self._belief is None:
+            return state
+        return {
+            **state,
+            "belief": self._belief.state(),
+            "theta": self._theta.tolist(),
+            "features": _plain(self._features),
+            "battery_V": _plain(self._battery_V),
+            "told": [int(value) for value in self._told],
+            "foreseen": self._foreseen.tolist(),
+            "choice": self._choice.tolist(),
+            "margin_rate": self._margin_rate,
+            "imagined": [part.tolist() for part in self._imagined],
+        }
+
+    def _load(self, state: Mapping[str, Any]) -> None:
+        belief, bounds = self._belief, getattr(self, "_bounds", None)
+        super()._load(state)
+        if "belief" not in state:
+            return
+        if belief is None:
+            raise ValueError("it began with a simulator, and none is given")
+        self._belief, self._bounds = belief, bounds
+        self._theta = np.array(state["theta"], dtype=np.float64).reshape(-1, self.dim)
+        self._features = np.array(state["features"], dtype=np.float64).reshape(-1, len(emulator.USED))
+        self._battery_V = np.array(state["battery_V"], dtype=np.float64)
+        self._told = np.array(state["told"], dtype=bool)
+        self._foreseen = np.array(state["foreseen"], dtype=np.float64)
+        self._choice = np.array(state["choice"], dtype=np.float64)
+        self._margin_rate = float(state["margin_rate"])
+        mu, sigma = (np.array(part, dtype=np.float64) for part in state["imagined"])
+        self._imagined = (mu, sigma)
+        self._belief.load(state["belief"], self._evidence() if len(self._theta) else None)
+        size = self.options.local * (1.0 if self.model_fits else self.options.wide)
+        expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)
+        self._corrected = correction.fit(self._theta, self._told, expected, self.options.length * self.sigma0, size)
+
+
+def _plain(values: FloatArray) -> list[Any]:
+    """Plain data for JSON, None for NaN."""
+    return np.where(np.isfinite(values), values.astype(object), None).tolist()  # type: ignore[no-any-return]
