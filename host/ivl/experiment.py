@@ -9,9 +9,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from ivl import forms, yamlfile
+from ivl.belief.recording import Flight
 from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
 from ivl.rewards import RewardChoice
@@ -166,6 +168,11 @@ class Experiment(Task, Named):
     def n_episodes(self) -> int:
         """Episodes of `n_rollouts` that the budget pays for."""
         return self.budget // self.n_rollouts
+
+    @property
+    def flight(self) -> Flight:
+        """What every rollout of the experiment has in common."""
+        return Flight(self.speed_mps, self.angle_deg, self.policy.form, self.start, np.array(self.policy.bounds))
 
     def make_learner(self, seed: int) -> Learner:
         """A new learner at the start of its search."""

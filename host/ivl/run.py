@@ -18,10 +18,12 @@ from typing import Any
 import numpy as np
 
 import ivl
-from ivl import assess, experiment, links, native, yamlfile
-from ivl.errors import StoreError
+from ivl import assess, experiment, family, forms, links, native, yamlfile
+from ivl.belief.simulator import Simulator
+from ivl.errors import ConfigError, StoreError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
+from ivl.learners import LEARNERS
 from ivl.learning.loop import LearningRun, Progress, recent_rate, trials_of
 from ivl.learning.recorder import DISCARDED, SCORED, EpisodeRow, RolloutRows
 from ivl.links.options import Options
@@ -40,12 +42,14 @@ class Hooks:
     Attributes:
         on_start: Run folder, known before the first rollout.
         on_episode: After each stored episode.
+        on_bank: While simulated vehicles are flown before the first rollout: (vehicles done, vehicles).
         on_stage: Before each stage of the search for the best possible policy: (stage, number of stages).
     """
 
     on_start: Callable[[Path], None] | None = None
     on_episode: Callable[[Progress], None] | None = None
     on_stage: Callable[[int, int], None] | None = None
+    on_bank: Callable[[int, int], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -105,12 +109,13 @@ def run(
     world = chosen.make_world()
     manifest = make_manifest(chosen, world, n_trials, uri)
     with ExitStack() as stack:
-        source = _open_source(uri, chosen, world, threads, folder, flight)
+        simulator, notes = _simulator(chosen, world, threads, hooks)
+        source = _open_source(uri, chosen, world, threads, folder, flight, simulator is not None)
         stack.callback(source.close)
         store = stack.enter_context(_open(folder, chosen, manifest, resume))
         if hooks.on_start:
             hooks.on_start(folder)
-        LearningRun(trials_of(chosen, n_trials or 1), source, store).run(hooks.on_episode)
+        LearningRun(trials_of(chosen, n_trials or 1), source, store, simulator).run(hooks.on_episode)
         source.close()
         history, rollouts = store.episodes(), store.rollouts()
         best = _best(folder, world, chosen, threads, hooks)
@@ -122,18 +127,39 @@ def run(
             "learner": chosen.learner.name,
             "best": asdict(best),
             "discarded": n_discarded,
-            "warnings": source.warnings,
+            "warnings": [*notes, *source.warnings],
         }
         write_json(folder / "result.json", {**summary, "verdicts": [asdict(v) for v in verdicts]})
     return RunResult(folder, chosen, world, best, verdicts, history, rollouts, summary)
 
 
 def _open_source(
-    uri: str | None, chosen: Experiment, world: World, threads: int | None, folder: Path, flight: Options | None
+    uri: str | None,
+    chosen: Experiment,
+    world: World,
+    threads: int | None,
+    folder: Path,
+    flight: Options | None,
+    record: bool,
 ) -> RolloutSource:
     if uri is None:
-        return WorldSource(world, chosen, threads)
+        return WorldSource(world, chosen, threads, record)
     return links.open_source(uri, chosen, threads, replace(flight or Options(), folder=folder))
+
+
+def _simulator(
+    chosen: Experiment, world: World, threads: int | None, hooks: Hooks
+) -> tuple[Simulator | None, list[str]]:
+    """Simulated vehicles for a learner that begins with them, and why there are none."""
+    if not LEARNERS[chosen.learner.name].cls.uses_simulator:
+        return None, []
+    if chosen.policy.form != forms.PAPER:
+        return None, [f"learned from flights alone: a belief knows policies of the form {forms.PAPER}"]
+    try:
+        kin = family.of(world)
+    except ConfigError as error:
+        return None, [f"learned from flights alone: {error}"]
+    return Simulator.of(kin, chosen.flight, threads=threads, progress=hooks.on_bank), []
 
 
 def read_config(folder: Path) -> tuple[Experiment, int | None]:

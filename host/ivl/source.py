@@ -1,12 +1,13 @@
 """Where rollouts come from: the loop asks a `RolloutSource` and does not know whether it simulates or flies."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from ivl.belief.recording import simulated
 from ivl.experiment import Experiment
 from ivl.outcome import Outcomes, valid
 from ivl.world import World
@@ -37,11 +38,13 @@ class Flown:
         index: Rows of the plan, shape (m,).
         outcomes: Outcome records, shape (m,).
         discarded: Why these rollouts must not be scored; empty if they are to be scored.
+        recordings: What each recorded of its flip, shape (m, `ivl.belief.recording.N`); None if nobody asked.
     """
 
     index: npt.NDArray[np.intp]
     outcomes: Outcomes
     discarded: str = ""
+    recordings: npt.NDArray[np.float64] | None = None
 
 
 class RolloutSource(Protocol):
@@ -69,9 +72,11 @@ class RolloutSource(Protocol):
 class WorldSource:
     """The simulator in this process: a whole plan in one native batch."""
 
-    def __init__(self, world: World, experiment: Experiment, threads: int | None = None) -> None:
-        """Fly the experiment's approach in `world`."""
-        self.world, self._experiment, self._threads = world, experiment, threads
+    def __init__(
+        self, world: World, experiment: Experiment, threads: int | None = None, record: bool = False
+    ) -> None:
+        """Fly the experiment's approach in `world`; `record`: give what each flip recorded, too."""
+        self.world, self._experiment, self._threads, self._record = world, experiment, threads, record
         self.warnings: list[str] = []
 
     def fly(self, plan: Plan) -> Iterator[Flown]:
@@ -87,7 +92,15 @@ class WorldSource:
             start=experiment.start,
             threads=self._threads,
         )
-        yield from portions(self.world, outcomes)
+        recordings = self._recordings(plan) if self._record else None
+        for flown in portions(self.world, outcomes):
+            yield replace(flown, recordings=None if recordings is None else recordings[flown.index])
+
+    def _recordings(self, plan: Plan) -> npt.NDArray[np.float64]:
+        """Every rollout once more, as its recorder sees it: it is a pure function of its arguments."""
+        flight = self._experiment.flight
+        flown = zip(plan.theta, plan.seed.tolist(), plan.stream.tolist(), strict=True)
+        return np.array([simulated(self.world, flight, theta, seed, stream)[0] for theta, seed, stream in flown])
 
     def close(self) -> None:
         """Nothing to give back."""

@@ -32,7 +32,7 @@ from ivl.outcome import Outcomes
 from ivl.quantity import Quantity
 from ivl.rewards.base import TOTAL, Terms
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 _ROLLOUT_KEY = "trial INTEGER, episode INTEGER, idx INTEGER"
 _SEARCH = ("mu", "sigma", "recommended")
@@ -153,6 +153,7 @@ class RunStore:
         outcomes: Outcomes,
         terms: Terms,
         discarded: str = "",
+        recordings: npt.NDArray[np.float64] | None = None,
     ) -> None:
         """Commit the outcomes of some planned rollouts.
 
@@ -160,7 +161,7 @@ class RunStore:
             StoreError: One of them was not planned, or is scored already; then none is committed.
         """
         rewards = self._reward_columns()
-        names = ("status", "discarded", *rewards.values(), *self._outcome_columns)
+        names = ("status", "discarded", "recording", *rewards.values(), *self._outcome_columns)
         update = (
             f"UPDATE rollout SET {', '.join(f'{name}=?' for name in names)} "
             f"WHERE trial=? AND episode=? AND idx=? AND status='{PLANNED}'"
@@ -168,9 +169,12 @@ class RunStore:
         status = DISCARDED if discarded else SCORED
         columns = [terms[name].tolist() for name in rewards]
         columns += self._flatten(outcomes)
+        texts = [None] * len(trial) if recordings is None else [_recording_text(row) for row in recordings]
         rows = [
-            (status, discarded, *map(_to_sql, values), of_trial, episode, place)
-            for values, of_trial, place in zip(zip(*columns, strict=True), trial.tolist(), idx.tolist(), strict=True)
+            (status, discarded, text, *map(_to_sql, values), of_trial, episode, place)
+            for text, values, of_trial, place in zip(
+                texts, zip(*columns, strict=True), trial.tolist(), idx.tolist(), strict=True
+            )
         ]
         with self._transaction():
             changed = self._db.executemany(update, rows).rowcount
@@ -203,7 +207,7 @@ class RunStore:
 
     def rollouts(self, trial: int | None = None, episode: int | None = None) -> RolloutRows:
         """Rollouts of one trial or all, of one episode or all."""
-        names = ["trial", "episode", "idx", "stream", "status", *self.layout.policy_columns()]
+        names = ["trial", "episode", "idx", "stream", "status", "recording", *self.layout.policy_columns()]
         names += [*self._reward_columns().values(), *self._outcome_columns]
         query = f"SELECT {', '.join(names)} FROM rollout"
         wanted = {"trial": trial, "episode": episode}
@@ -230,6 +234,7 @@ class RunStore:
             reward=rewards.pop(TOTAL),
             outcomes=self._unflatten([column[name] for name in self._outcome_columns], n),
             terms=rewards,
+            recordings=_recordings(column["recording"]),
         )
 
     def _reward_columns(self) -> dict[str, str]:
@@ -248,7 +253,7 @@ class RunStore:
         figures = ", ".join(f"{name} {kind}" for name, kind in self._figures().items())
         self._db.execute(
             f"CREATE TABLE rollout({_ROLLOUT_KEY}, stream INTEGER NOT NULL, status TEXT NOT NULL, discarded TEXT, "
-            f"{policy}, {rewards}, {outcome}, PRIMARY KEY(trial, episode, idx)) WITHOUT ROWID"
+            f"recording TEXT, {policy}, {rewards}, {outcome}, PRIMARY KEY(trial, episode, idx)) WITHOUT ROWID"
         )
         self._db.execute(
             f"CREATE TABLE episode(trial INTEGER, episode INTEGER, {figures}, PRIMARY KEY(trial, episode))"
@@ -358,6 +363,20 @@ def _outcome_columns(dtype: np.dtype[np.void]) -> dict[str, str]:
         names = [f"out_{name}"] if not field.shape else [f"out_{name}_{i + 1}" for i in range(count)]
         columns.update(dict.fromkeys(names, kind))
     return columns
+
+
+def _recording_text(row: npt.NDArray[np.float64]) -> str:
+    """A recording as JSON; null where there is nothing."""
+    return json.dumps([_to_sql(value) for value in row.tolist()])
+
+
+def _recordings(texts: Sequence[str | None]) -> npt.NDArray[np.float64] | None:
+    """Inverse of `_recording_text` for many; None if there is none at all."""
+    rows = [None if text is None else json.loads(text) for text in texts]
+    n = next((len(row) for row in rows if row is not None), 0)
+    if not n:
+        return None
+    return np.array([[np.nan] * n if row is None else row for row in rows], dtype=np.float64)
 
 
 def _to_sql(value: Any) -> Any:

@@ -26,6 +26,8 @@ Examples:
       the paper's vertical landing
   ivl learn experiments/paper_vertical.yaml --learner ephe
       another learner (see: ivl list learners)
+  ivl learn experiments/paper_flight.yaml --learner ephe_belief
+      begin with simulated vehicles: the first flights land
   ivl learn experiments/paper_vertical.yaml --set gear_set=table1 --set sense.latency=0.02
       another landing gear, slower sensing
   ivl learn experiments/paper_vertical.yaml --trials 100 --json
@@ -79,7 +81,7 @@ def learn(
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume)
     folder = out or run.default_folder(chosen, n_trials, resume)
-    hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage)
+    hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage, _bank)
     flight = Options(
         mocap=mocap_config.load(mocap) if mocap else None,
         other_world=other_world,
@@ -137,6 +139,11 @@ def _announce(folder: Path) -> None:
 
 def _stage(stage: int, n_stages: int) -> None:
     console.err.print(f"judging: best possible policy, stage {stage + 1} of {n_stages}", highlight=False)
+
+
+def _bank(done: int, n: int) -> None:
+    if done == n or done % max(n // 10, 1) == 0:
+        console.err.print(f"simulated vehicles: {done} of {n}", highlight=False)
 
 
 def _draw(result: run.RunResult) -> list[Path]:

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from ivl.belief.simulator import Simulator
 from ivl.experiment import Experiment
-from ivl.learners import Learner
-from ivl.learners.base import LANDED, FloatArray
+from ivl.learners import EpheBelief, Learner
+from ivl.learners.base import LANDED, RECORDING, FloatArray
 from ivl.learning.recorder import PLANNED, SCORED, EpisodeRow, Recorder, RolloutRows
 from ivl.outcome import RECENT_EPISODES, BoolArray, clean, four_leg
 from ivl.seeds import Purpose, derive
@@ -50,17 +51,27 @@ def trials_of(experiment: Experiment, n_trials: int = 1) -> list[Experiment]:
 class LearningRun:
     """Trials that go on together, episode by episode, through one source and one recorder."""
 
-    def __init__(self, trials: Sequence[Experiment], source: RolloutSource, recorder: Recorder) -> None:
+    def __init__(
+        self,
+        trials: Sequence[Experiment],
+        source: RolloutSource,
+        recorder: Recorder,
+        simulator: Simulator | None = None,
+    ) -> None:
         """Start, or continue where the recorder stands.
 
         Args:
             trials: What each trial is; they have budget, episodes and reward in common.
             source: Where their rollouts come from.
             recorder: Keeps what they do.
+            simulator: Simulated vehicles, for learners that begin with them.
         """
         self._first, self._source, self._recorder = trials[0], source, recorder
         self._world_seed = np.array([derive(trial.seed, Purpose.WORLD) for trial in trials], dtype=np.uint64)
         self._learners = [trial.make_learner(derive(trial.seed, Purpose.LEARNER)) for trial in trials]
+        for learner in self._learners:
+            if simulator is not None and isinstance(learner, EpheBelief):
+                learner.begin(simulator)
         for number, state in recorder.learner_states().items():
             self._learners[number].load_state_dict(state)
         self._history: list[EpisodeRow] = recorder.episodes()
@@ -112,7 +123,7 @@ class LearningRun:
             rows = still[flown.index]
             terms = self._first.reward.score(flown.outcomes)
             self._recorder.score(
-                episode, rollouts.trial[rows], rollouts.idx[rows], flown.outcomes, terms, flown.discarded
+                episode, rollouts.trial[rows], rollouts.idx[rows], flown.outcomes, terms, flown.discarded, flown.recordings
             )
             self._n_flown += len(rows)
 
@@ -123,6 +134,8 @@ class LearningRun:
             chosen = (rollouts.trial == trial) & scored
             outcomes, learner = rollouts.outcomes[chosen], self._learners[trial]
             meta = {name: outcomes[name] for name in outcomes.dtype.names or ()} | {LANDED: four[chosen]}
+            if rollouts.recordings is not None:
+                meta[RECORDING] = rollouts.recordings[chosen]
             learner.tell(rollouts.theta[chosen], rollouts.reward[chosen], meta)
             rows.append(_episode_row(trial, episode, learner, rollouts.reward[chosen], four[chosen], spotless[chosen]))
         self._recorder.finish_episode(rows, self._states(active))

@@ -34,6 +34,8 @@ class RolloutRows:
         reward: Return, shape (n,), NaN if not flown.
         outcomes: Outcome records, shape (n,); NaN and zero if not flown.
         terms: Terms of the return by name, shape (n,) each, NaN if not flown.
+        recordings: What each recorded of its flip, shape (n, `ivl.belief.recording.N`), NaN where nothing was; None: the
+            recorder keeps none.
     """
 
     trial: npt.NDArray[np.int64]
@@ -45,6 +47,7 @@ class RolloutRows:
     reward: npt.NDArray[np.float64]
     outcomes: Outcomes
     terms: dict[str, npt.NDArray[np.float64]] = field(default_factory=dict)
+    recordings: npt.NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         """Number of rollouts."""
@@ -109,6 +112,7 @@ class Recorder(Protocol):
         outcomes: Outcomes,
         terms: Terms,
         discarded: str = "",
+        recordings: npt.NDArray[np.float64] | None = None,
     ) -> None:
         """Keep the outcomes of some planned rollouts of an episode.
 
@@ -119,6 +123,7 @@ class Recorder(Protocol):
             outcomes: Outcome records, shape (n,).
             terms: The return, `total`, and the reward's terms by name, shape (n,) each.
             discarded: Reason why they must not be learned from; empty if they are to be.
+            recordings: What each recorded of its flip, shape (n, `ivl.belief.recording.N`); None if nothing.
         """
         ...
 

@@ -189,6 +189,7 @@ class Columns:
         outcomes: Outcomes,
         terms: Terms,
         discarded: str = "",
+        recordings: FloatArray | None = None,  # noqa: ARG002 - a sweep's learners learn from flights alone
     ) -> None:
         """Keep outcomes; returns only of those that count."""
         log = self._log
