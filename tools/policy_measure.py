@@ -16,12 +16,13 @@ import numpy.typing as npt
 import policy_oneclass
 
 from ivl import forms as policy_forms
-from ivl.analysis.intervals import Z95, share_of
+from ivl import native
+from ivl.analysis.intervals import share_of, student95
 from ivl.outcome import clean, four_leg
 from ivl.policy import assess, file, general, learn
 from ivl.policy.assess import Assessment
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Family, Place, PolicyTask, fly
+from ivl.policy.flying import Family, Place, PolicyTask, fly, fly_own
 from ivl.policy.flying import score as score_of
 from ivl.policy.region import BOX, PLANE, Approaches, Series
 from ivl.policy.shape import General, is_general
@@ -78,7 +79,8 @@ class Bench:
     def learned(self, *settings: str, start: PolicyFile | None = None) -> PolicyFile:
         """The policy of the shipped experiment with some settings; learned once."""
         chosen = general.load([EXPERIMENT], settings)
-        text = json.dumps([chosen.model_dump(mode="json"), start.digest if start else None], sort_keys=True)
+        made_by = native.library().digest()
+        text = json.dumps([chosen.model_dump(mode="json"), start.digest if start else None, made_by], sort_keys=True)
         path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.yaml"
         if not path.exists():
             self.say(f"learning: {' '.join(settings) or EXPERIMENT}")
@@ -100,7 +102,7 @@ def about(policy: PolicyFile) -> Data:
     return {
         "form": policy.form,
         "theta": policy.values,
-        "crc": f"{policy.crc:08x}",
+        "crc": f"{policy.checksum:08x}",
         "flights": training.rollouts if training else None,
     }
 
@@ -119,30 +121,16 @@ def sensors(bench: Bench) -> Data:
 def go_no_go(bench: Bench) -> Data:
     """The default policy with a go / no-go that was learned with a camera, over the plane."""
     policy = bench.learned(*GO_ALONE, *SENSORS["camera50"], start=bench.learned())
-    return {"camera50": {**about(policy), **bench.judged(policy).as_dict(), "contacts": contacts(bench, policy)}}
+    judged = bench.judged(policy)
+    return {"camera50": {**about(policy), **judged.as_dict(), "clearance_m": clearance_m(bench, policy)}}
 
 
-def contacts(bench: Bench, policy: PolicyFile) -> Data:
-    """When the refused approaches of `assess` touched the ceiling: before they were called off, or in the level-out."""
+def clearance_m(bench: Bench, policy: PolicyFile) -> float:
+    """Least distance from the ceiling of the refused approaches of `assess` that touched nothing."""
     place = Place.of(policy.tasks[0])
-    approaches = Series([PLANE], SEED, Purpose.ASSESS).next(N_APPROACHES)
+    approaches = assess.fresh(PLANE, N_APPROACHES, SEED)
     (flown,) = fly([place], policy.form, np.array(policy.values), approaches, bench.threads)
-    touched = np.flatnonzero((flown["no_go"] == 1) & np.isfinite(flown["t_impact_s"]))
-    phases = []
-    for i in touched:
-        rows = place.world.trace(
-            float(approaches.speed_mps[i]), float(approaches.angle_deg[i]), *policy.values, form=policy.form,
-            seed=approaches.seed, stream=int(approaches.stream[i]), start=place.task.start,
-        ).rows  # fmt: skip
-        before = rows["phase"][rows["t_s"] < flown["t_impact_s"][i]]
-        phases.append(place.world.phase_name(int(before[-1])))
-    refused = flown["no_go"] == 1
-    return {
-        "before": phases.count("approach"),
-        "in_level_out": len(phases) - phases.count("approach"),
-        "refused": int(refused.sum()),
-        "clearance_m": float(np.sort(flown["d_min_m"][refused & ~np.isfinite(flown["t_impact_s"])])[0]),
-    }
+    return float(np.min(flown["d_min_m"][(flown["no_go"] == 1) & ~np.isfinite(flown["t_impact_s"])]))
 
 
 @dataclass(frozen=True)
@@ -198,13 +186,9 @@ def ceiling(bench: Bench, task: PolicyTask, cells: Cells) -> tuple[FloatArray, A
 
 def _fly_cells(place: Place, policies: FloatArray, approaches: Approaches, threads: int | None) -> Any:
     """Outcomes (policies, cells, n) of policies (policies, cells, 2) that belong to a cell each."""
-    n_cells = policies.shape[1]
-    shape = (n_cells, len(approaches) // n_cells)
-    speed, angle, stream = (a.reshape(shape) for a in (approaches.speed_mps, approaches.angle_deg, approaches.stream))
-    rrev, moment = policies[..., 0, None], policies[..., 1, None]
-    return place.world.rollouts(
-        speed, angle, rrev, moment, seed=approaches.seed, stream=stream, start=place.task.start, threads=threads
-    )
+    n = len(approaches) // policies.shape[1]
+    (flown,) = fly_own([place], "constant", np.repeat(policies, n, axis=1), approaches, threads)
+    return flown.reshape(*policies.shape[:2], n)
 
 
 def beside_ceiling(bench: Bench, policy: PolicyFile, cells: Cells | None = None) -> Data:
@@ -309,7 +293,7 @@ def family(bench: Bench) -> Data:
                 "nominal_box": over(bench, policy, "box")["box"],
             }
         gain = shares["family"][:, 0] - shares["nominal"][:, 0]
-        half = float(Z95 * gain.std(ddof=1) / np.sqrt(gain.size))
+        half = float(student95(gain.size - 1) * gain.std(ddof=1) / np.sqrt(gain.size))
         row["gain"] = {"landed": float(gain.mean()), "half": half, "better": int((gain > 0).sum())}
         row["vehicles"], row["flights"] = N_DRAWN, len(approaches)
         found[f"crazyflie21, table1, {gear}"] = row

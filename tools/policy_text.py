@@ -101,8 +101,7 @@ def _go(found: Data) -> list[str]:
         least = name == "strikes_avoided"
         met = verdict(go[name], asked, *go[f"{name}_interval"], least)
         rows.append((title, f"{'>=' if least else '<='} {_rate(asked)}", _with(go, name), met))
-    touched = camera["contacts"]
-    n = touched["in_level_out"]
+    n = go["level_out_contacts"]
     rows.append(("contacts in level-outs", "0", str(n), "yes" if n == 0 else f"no, by {n}"))
     return [
         "### Go / no-go",
@@ -115,11 +114,9 @@ def _go(found: Data) -> list[str]:
         ),
         table(("", "asked", "measured", "met"), rows),
         _paragraph(
-            f"Of the {touched['refused']} refused approaches {touched['before']} touched the ceiling before",
-            "they were called off",
-            "(without a distance there is no cue, and without a cue nothing is decided); the least",
-            "clearance of those that",
-            f"touched nothing was {100 * touched['clearance_m']:.1f} cm.",
+            f"Of the refused approaches {go['contacts_before_no_go']} touched the ceiling before they were called off",
+            "(without a distance there is no cue, and without a cue nothing is decided); the least clearance of those",
+            f"that touched nothing was {100 * camera['clearance_m']:.1f} cm.",
         ),
     ]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,9 +20,12 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class PolicyTask(Setup):
-    """What a policy is learned on: a task without speed and angle."""
+    """What a policy is learned on: a task without speed and angle, whose flights come to a trigger of their own."""
 
     gear: str = Field(description="Landing gear; see `ivl list gears`.")
+    start: Literal["imparted", "flown"] = Field(
+        default="imparted", description="At the approach velocity (imparted), or from hover (flown)."
+    )
 
 
 class Family(Strict):

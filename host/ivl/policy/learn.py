@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ivl.errors import ConfigError
-from ivl.outcome import clean, four_leg
+from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import file, go, search
-from ivl.policy.file import PolicyFile, Score, Training
+from ivl.policy.file import PolicyFile, Score, Training, WithGo
 from ivl.policy.flying import Place, fly, objective
 from ivl.policy.general import GeneralExperiment
-from ivl.policy.region import Series
+from ivl.policy.region import Approaches, Series
 from ivl.policy.shape import FloatArray, General
 from ivl.policy.start import best_of, fit, fly_map
 from ivl.seeds import Purpose
@@ -141,13 +141,11 @@ class _Run:
     def choose(self) -> None:
         """The best of start and recommendations, on approaches that none of them has met."""
         known = self._known()
-        approaches = Series(self._chosen.regions, self._chosen.seed, Purpose.SELECT).next(self._chosen.search.n_select)
+        approaches = self._choosing()
         found = []
         for i, theta in enumerate(known.candidates):
             self._say("choice", i / len(known.candidates))
-            flown = fly(self._places, self._general.form.name, _rounded(theta), approaches, self._threads)
-            known.n_flights += len(self._places) * len(approaches)
-            rates = [float(np.mean([rate(o).mean() for o in flown])) for rate in (four_leg, clean)]
+            flown, *rates = self._rates(_rounded(theta), approaches)
             found.append((float(objective(flown)), *rates))
         best = max(range(len(found)), key=lambda i: found[i][0])
         known.theta, known.start_objective, known.objective = known.candidates[best], found[0][0], found[best][0]
@@ -155,8 +153,18 @@ class _Run:
         known.score = Score(landed=landed, clean=spotless, flights=len(self._places) * len(approaches))
         self._say("choice", 1.0)
 
+    def _choosing(self) -> Approaches:
+        return Series(self._chosen.regions, self._chosen.seed, Purpose.SELECT).next(self._chosen.search.n_select)
+
+    def _rates(self, theta: FloatArray, approaches: Approaches) -> tuple[list[Outcomes], float, float]:
+        """Outcomes of a policy, and its shares of landings and of clean ones."""
+        flown = fly(self._places, self._general.form.name, theta, approaches, self._threads)
+        self._known().n_flights += len(self._places) * len(approaches)
+        landed, spotless = (float(np.mean([rate(o).mean() for o in flown])) for rate in (four_leg, clean))
+        return flown, landed, spotless
+
     def learn_go(self) -> None:
-        """Probability of a landing, and the least one that is flown."""
+        """Probability of a landing, the least one that is flown, and what this does to the score."""
         known, general, settings = self._known(), self._general, self._chosen.go
         series = [Series([settings.region], self._chosen.seed, purpose) for purpose in (Purpose.GO, Purpose.HELD_OUT)]
         self._say("go / no-go", 0.0)
@@ -172,8 +180,15 @@ class _Run:
         p_min = go.choose_p_min(
             go.probabilities(coefficients, held), held, settings.strikes_avoided_min, settings.refused_good_max
         )
-        known.theta = theta.copy()
-        known.theta[general.go], known.theta[general.go_p_min] = coefficients, p_min
+        theta[general.go], theta[general.go_p_min] = coefficients, p_min
+        score = known.score
+        if score is not None and p_min > 0.0:
+            self._say("go / no-go", 0.9)
+            flown, landed, spotless = self._rates(theta, self._choosing())
+            refused = float(np.mean([(outcomes["no_go"] == 1).mean() for outcomes in flown]))
+            with_go = WithGo(refused=refused, landed=landed, clean=spotless)
+            score = score.model_copy(update={"with_go": with_go})
+        known.theta, known.score = theta, score
         self._say("go / no-go", 1.0)
 
     def result(self, interrupted: bool) -> PolicyFile:

@@ -7,11 +7,12 @@ import numpy as np
 import typer
 from rich.table import Table
 
+from ivl import native
 from ivl.cli import console, policy_options
 from ivl.cli.policy import survey_options
 from ivl.errors import ConfigError
 from ivl.policy import file
-from ivl.policy.file import PolicyFile
+from ivl.policy.file import NONE, PolicyFile
 from ivl.policy.shape import General, is_general
 from ivl.policy.survey import survey
 
@@ -63,7 +64,7 @@ def show(
         constant, n = survey_options.constant_of(rrev, moment), approaches or survey_options.N_APPROACHES
         _draw_all(policy, plot, n, seed, constant, threads)
     if as_json:
-        console.print_json({**policy.model_dump(mode="json"), "crc": policy.crc, "table": _table(policy)})
+        console.print_json({**policy.model_dump(mode="json"), "crc": f"{policy.checksum:08x}", "table": _table(policy)})
     else:
         _print(policy)
 
@@ -114,7 +115,11 @@ def _print(policy: PolicyFile) -> None:
     _line("form", f"{form.name}: {form.doc}")
     for p, value in zip(form.params, policy.values, strict=True):
         _line(f"  {p.name}", f"{value:.6g} {p.unit}")
-    _line("checksum on a vehicle", f"{policy.crc:08x}")
+    _line("checksum on a vehicle", f"{policy.checksum:08x}")
+    if policy.digest == NONE:
+        _line("digest", "none: written or changed by hand, so that origin and score need not be those of the numbers")
+    elif policy.made_by != native.library().digest():
+        _line("made by", "another version of the simulator, in which landing rates may differ")
     for task in policy.tasks:
         told = task.model_dump(mode="json", exclude_defaults=True)
         overrides = {name: setting["value"] for name, setting in told.pop("overrides", {}).items()}
@@ -122,6 +127,8 @@ def _print(policy: PolicyFile) -> None:
     if policy.training is not None:
         t = policy.training
         _line("learned by", f"{t.learner.name}, seed {t.seed}, {t.rollouts} flights{', interrupted' * t.interrupted}")
+        if t.family is not None:
+            _line("learned over", f"{t.family.n_vehicles} vehicles drawn in place of each (seed {t.family.seed})")
         for region in t.regions:
             (v0, v1), (a0, a1) = region.speeds_mps, region.angles_deg
             _line("approaches", f"{v0:g} to {v1:g} m/s, {a0:g} to {a1:g} degrees")
@@ -131,7 +138,15 @@ def _print(policy: PolicyFile) -> None:
         )
     if policy.score is not None:
         s = policy.score
-        _line("score", f"{console.percent(s.landed)} land, {console.percent(s.clean)} clean, of {s.flights} flights")
+        what = "every one flown" if s.with_go is not None else "none refused"
+        _line(
+            "score",
+            f"{console.percent(s.landed)} land, {console.percent(s.clean)} clean, of {s.flights} approaches, {what}",
+        )
+        if s.with_go is not None:
+            own = s.with_go
+            rates = f"{console.percent(own.landed)} land, {console.percent(own.clean)} clean"
+            _line("with go / no-go", f"{console.percent(own.refused)} of them are refused, {rates}")
     found = _table(policy)
     if found is None:
         return
