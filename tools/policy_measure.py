@@ -70,7 +70,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Bench:
-    """Where policies are kept, and what is told of the progress."""
+    """Where policies are kept, and who hears of the progress."""
 
     folder: Path
     say: Callable[[str], None]

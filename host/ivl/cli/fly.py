@@ -81,7 +81,7 @@ def fly(
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
     tracker = mocap_config.load(mocap) if mocap else None
-    # one landing is also of interest in another world; it is told
+    # one landing is also of interest in another world; the vehicle's site warns of it
     options = Options(
         mocap=tracker, rehearse=rehearse, other_world=True, keep_recordings=csv is not None, say=console.say
     )

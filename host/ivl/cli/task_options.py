@@ -92,7 +92,7 @@ class Chosen:
         return data | self.given
 
     def make_world(self, *bases: BaseModel) -> World:
-        """The world alone, for commands that are told the approach by somebody else; `bases` as for `fields`."""
+        """The world alone, for commands to which somebody else says the approach; `bases` as for `fields`."""
         data = self.fields(*bases)
         gear = str(data["gear"])
         setup = yamlfile.validate(Setup, {n: v for n, v in data.items() if n in Setup.model_fields}, _LABEL)

@@ -142,7 +142,7 @@ def _first(*masks: BoolArray) -> int | None:
 
 
 def _same(flown: Any) -> Callable[[Any], bool]:
-    """Whether an outcome is the one that was counted; what go / no-go said is told, and changes nothing."""
+    """Whether an outcome is the one that was counted; what go / no-go decided does not count."""
 
     def same(record: Any) -> bool:
         batch: Outcomes = np.array([record], dtype=flown.dtype)

@@ -73,7 +73,7 @@ class Room:
         """Nothing: nobody knows what must come of a landing."""
 
     def leave(self) -> None:
-        """Down and disarmed; what was done is told."""
+        """Bring the vehicle down and disarm it, and say what was done."""
         self._come_down()
         give_back_time(self._vehicle.clock, self._say)
 
