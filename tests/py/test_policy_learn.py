@@ -89,8 +89,8 @@ def test_it_says_how_it_was_learned(learned: PolicyFile) -> None:
     assert score is not None
     assert training.learner.name == "cmaes"
     assert training.approaches == 3 * 8
-    # map, search, choice among the start and three ends, go / no-go twice
-    assert training.rollouts == 30 * 4 + 3 * 4 * 8 + 4 * 60 + 2 * 300
+    # map, three starts, search, choice among the start and three ends, go / no-go twice, and its effect
+    assert training.rollouts == 30 * 4 + 3 * 8 + 3 * 4 * 8 + 4 * 60 + 2 * 300 + 60
     assert training.objective == pytest.approx(0.5 * (score.landed + score.clean))
     assert training.start_objective is not None
     assert training.objective >= training.start_objective
@@ -273,7 +273,7 @@ def test_a_digest_is_that_of_the_file_whatever_the_defaults_are(path: Path) -> N
         without = copy.deepcopy(data)
         assert without["tasks"][0].pop(name) == default
         path.write_text(yaml.safe_dump(without))
-        with pytest.raises(ConfigError, match="digest: .*changed after it was written"):
+        with pytest.raises(ConfigError, match=r"digest: .*changed after it was written"):
             file.load(path)
         # as an earlier version would have written it, that knew no such field
         path.write_text(yaml.safe_dump({**without, "digest": file._digest(without)}))
@@ -537,6 +537,90 @@ def test_a_landing_is_flown_on_what_the_policy_was_learned_on(path: Path, capsys
     assert (slow["end_reason"], slow["no_go"], slow["n_legs"], slow["t_impact_s"]) == ("no_go", 1, 0, None)
     other = ["rollout", "--policy", str(path), "--gear", "narrow_long", "--speed", "2.5", "--angle", "60", "--json"]
     assert json.loads(run(other, capsys))["t_impact_s"] != told["t_impact_s"]
+
+
+def test_the_approach_of_a_policy_is_said_and_never_guessed(path: Path, capsys: Capture) -> None:
+    fly = ["fly", "--uri", "udp://127.0.0.1:9", "--policy", str(path)]
+    for more, told in (
+        ([], "--speed is missing: a policy file says no approach"),
+        (["--speed", "2"], "--angle is missing"),
+        (["--set", "speed_mps=2.0"], "--angle is missing"),
+    ):
+        assert cli.run([*fly, *more]) == 2
+        assert told in capsys.readouterr().err
+    for more in (["--speed", "2", "--angle", "60"], ["experiments/paper_vertical.yaml"]):
+        assert cli.run([*fly, *more]) == 1, "nobody listens there"
+        assert "nobody listens" in capsys.readouterr().err
+
+
+def test_which_of_several_tasks_is_flown_is_said_and_never_guessed(
+    by_hand: PolicyFile, tmp_path: Path, capsys: Capture
+) -> None:
+    others = [TASK.model_copy(update={"gear": gear}) for gear in ("narrow_long", "wide_short")]
+    path, model = tmp_path / "g.yaml", str(tmp_path / "model.txt")
+    file.save(file.make(by_hand.shape, by_hand.values, [TASK, *others], None, None), path)
+    rollout = ["rollout", "--policy", str(path), "--speed", "2.5", "--angle", "60", "--json"]
+    fly = ["fly", "--uri", "udp://127.0.0.1:9", "--policy", str(path), "--speed", "2.5", "--angle", "60"]
+    sil = ["sil", "--policy", str(path), "--write-model", model]
+    for command, wanted in ((rollout, 0), (fly, 1), (sil, 0)):
+        assert cli.run(command) == 2
+        told = capsys.readouterr().err
+        assert "3 tasks that differ in gear (wide_short, narrow_long): say which, for example --set gear=" in told
+        assert told.count("\n") == 1
+        assert cli.run([*command, "--set", "gear=narrow_long"]) == wanted
+        capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        (["--set", "speed_mps=1.2"], "--set speed_mps=1.2: speed_mps cannot be set: the approaches are drawn"),
+        (["--set", "angle_deg=60"], "angle_deg cannot be set"),
+        (["--start", "at_trigger"], "start: value 'at_trigger'"),
+        (["--set", "start=at_trigger"], "start: value 'at_trigger'"),
+    ],
+)
+def test_what_an_assessment_draws_or_cannot_fly_is_not_set(
+    path: Path, capsys: Capture, said: list[str], told: str
+) -> None:
+    assert cli.run(["policy", "assess", str(path), "--approaches", "10", *said]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
+
+
+def test_the_help_of_an_assessment_says_what_is_flown_unless_told(capsys: Capture) -> None:
+    assert cli.run(["policy", "assess", "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert text.count("default: as it was learned") == 7
+    assert "default: habas2021" not in text
+    assert "trigger" not in text
+
+
+def test_an_assessment_says_which_vehicles_fly(by_hand: PolicyFile, learned: PolicyFile, tmp_path: Path) -> None:
+    assert learned.training is not None
+    over = learned.training.model_copy(update={"family": Family(n_vehicles=6, seed=1)})
+    family = file.make(learned.shape, learned.values, learned.tasks, over, learned.score)
+    found = judging.assess(family, n_approaches=20)
+    assert str(found.vehicles) == "those of the files; the policy was learned over 6 drawn ones (seed 1)"
+    assert found.as_dict()["vehicles"] == {"drawn": None, "learned_over": {"n_vehicles": 6, "seed": 1}}
+
+
+def test_a_score_says_what_go_no_go_does(learned: PolicyFile) -> None:
+    """It is of every approach flown, and beside it of the same approaches with the policy's own go / no-go."""
+    score, training = learned.score, learned.training
+    assert score is not None
+    assert training is not None
+    approaches = Series(training.regions, training.seed, Purpose.SELECT).next(60)
+    (own,) = fly([Place.of(learned.tasks[0])], learned.form, learned.values, approaches)
+    assert learned.theta["go_p_min"].value > 0
+    assert score.with_go is not None
+    assert score.with_go.refused == (own["no_go"] == 1).mean()
+    assert (score.with_go.landed, score.with_go.clean) == (four_leg(own).mean(), clean(own).mean())
+    (free,) = fly(
+        [Place.of(learned.tasks[0])], learned.form, General(learned.form).always_go(learned.values), approaches
+    )
+    assert (score.landed, score.clean) == (four_leg(free).mean(), clean(free).mean())
 
 
 @pytest.mark.parametrize("more", [["--rrev", "4.8"], ["--moment", "8"], ["--form", "constant"], ["--theta", "4.8,8"]])

@@ -6,8 +6,8 @@ mean      of the landing rates of n trials. Rollouts of one trial share a policy
           Wilson's interval over all of them would be far too narrow. Rates lie in 0 .. 1, so the variance of one is at
           most p (1 - p): Wilson's interval with the number of *trials* in the place of n covers at least as often as
           it says, however alike the rollouts of a trial are. Nothing has to be estimated from five numbers.
-clusters  share of answers that are alike within clusters, of one kind or of two crossed ones (vehicles, approaches): the
-          variance between the clusters says how many independent answers they are worth, for Wilson's interval.
+clusters  share of answers that are alike within clusters, of one kind or of two crossed ones (vehicles, approaches):
+          the variance between them says how many independent answers they are worth, for Wilson's interval.
 contrast  differences of averages over many cells: the variance within each cell, estimated without bias from its
           trials, summed over the cells (a stratified sample). A bootstrap of five trials a cell would give 4/5 of it.
 """
@@ -125,12 +125,11 @@ def share_of_clusters(happened: npt.ArrayLike, counted: npt.ArrayLike, *clusters
     """Share of true values among answers that are alike within clusters: flights of one vehicle, or of one approach.
 
     The variance of the share is that between the clusters, of crossed ones their sum less what both hold (Cameron,
-    Gelbach and Miller 2011); the answers count as so many independent ones as have this variance, but never as more
-    than there are (Kish's design effect). Wilson's interval with that number, and with Student's quantile for the number
-    of clusters, has its level at small shares, too. Where all answers are equal, or fewer than four clusters have any,
-    nothing tells how alike they are, and a cluster counts as one answer. Clusters of unequal size count as fewer equal
-    ones. Where a cluster has one answer each, this is
-    `share_of`.
+    Gelbach and Miller 2011). The answers count as so many independent ones as have this variance, but never as more
+    than there are (Kish's design effect). Wilson's interval with that number, and with Student's quantile for the
+    number of clusters, has its level at small shares, too. Where all answers are equal, or fewer than four clusters
+    have any, nothing tells how alike they are, and a cluster counts as one answer. Clusters of unequal size count as
+    fewer equal ones. Where a cluster has one answer each, this is `share_of`.
 
     Args:
         happened: True or false, any shape.

@@ -99,7 +99,7 @@ def _experiment(
 ) -> Experiment:
     """What is flown: the experiment that is named, or what the policy was learned on, or the paper's approach."""
     if learned is None:
-        return experiment.load(path or _USUAL, settings, **approach)
+        return experiment.load(path or _USUAL, settings, None, **approach)
     if path is not None:
         return experiment.load(path, settings, use.as_start(learned), **approach)
     said = {parse_setting(setting)[0] for setting in settings}

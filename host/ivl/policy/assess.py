@@ -5,8 +5,8 @@ shaped       those of the plane, with the approach that first leads into the reg
 go           on the plane: how well the estimate tells landings from failures, and what the policy's own `go_p_min`
              does with the same flights
 
-Flights of one approach, on several tasks or with several vehicles, are alike, and so are those of one drawn vehicle. The
-intervals know that.
+Flights of one approach, on several tasks or with several vehicles, are alike, and so are those of one drawn vehicle.
+The intervals know that.
 """
 
 from collections.abc import Sequence
@@ -223,7 +223,7 @@ class _Bench:
         return stacked.reshape(*stacked.shape[:-2], self._n_tasks, -1, self._n)
 
     def _share(self, happened: BoolArray, counted: BoolArray | None = None) -> Estimate:
-        """A share of flights, shape (tasks, vehicles, approaches); tasks are given, vehicles and approaches are drawn."""
+        """A share of flights (tasks, vehicles, approaches); tasks are given, vehicles and approaches are drawn."""
         _, vehicle, approach = np.indices(happened.shape)
         drawn = (approach, vehicle) if self._is_family else (approach,)
         return share_of_clusters(happened, np.ones(happened.shape) if counted is None else counted, *drawn)
@@ -268,7 +268,9 @@ class _Bench:
         approaches = fresh(PLANE, self._n, self._seed)
         of_places = own.reshape(len(places), self._n)
         touched = (of_places["no_go"] == 1) & np.isfinite(of_places["t_impact_s"])
-        during = [self._is_in_level_out(places[i], approaches, int(j), of_places[i, j]) for i, j in np.argwhere(touched)]
+        during = [
+            self._is_in_level_out(places[i], approaches, int(j), of_places[i, j]) for i, j in np.argwhere(touched)
+        ]
         return len(during) - sum(during), sum(during)
 
     def _is_in_level_out(self, place: Place, approaches: Approaches, i: int, outcome: Any) -> bool:

@@ -24,7 +24,6 @@ from ivl.policy.flying import Family, PolicyTask
 from ivl.policy.region import RegionField
 from ivl.settings import Finite, Strict, check_overrides
 
-
 NONE = "none"
 """Digest of a policy that was written or changed by hand."""
 _BY_HAND = f"digest: {NONE} accepts a policy that was written or changed by hand"

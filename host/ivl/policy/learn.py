@@ -1,4 +1,4 @@
-"""From an experiment to a policy file: map, search, choice, go / no-go.
+"""From an experiment to a policy file: map, fit, search, choice, go / no-go.
 
 policy = learn(general.load(["experiments/general.yaml"]))
 """
@@ -14,13 +14,16 @@ from ivl.policy import file, go, search
 from ivl.policy.file import PolicyFile, Score, Training, WithGo
 from ivl.policy.flying import Place, fly, objective
 from ivl.policy.general import GeneralExperiment
+from ivl.policy.polish import polish
 from ivl.policy.region import Approaches, Series
 from ivl.policy.shape import FloatArray, General
-from ivl.policy.start import best_of, fit, fly_map
+from ivl.policy.start import best_of, fit, fly_map, moment_most_Nmm
 from ivl.seeds import Purpose
 
 _DIGITS = 7  # of a number in single precision, which is what a vehicle keeps
 _N_CHECKPOINTS = 5
+_TIMINGS_NORM = (0.5, 1.0)
+"""Parts of the map's error of the trigger's instant, over which it is smoothed when policies are looked up in it."""
 
 
 @dataclass(frozen=True)
@@ -114,13 +117,29 @@ class _Run:
             raise ConfigError(f"form {general.form.name}: the policy to start from is of the form {start.form}")
         self._say("map", 0.0)
         chosen = self._chosen
-        self._best = best_of(fly_map(chosen.map, chosen.regions, chosen.seed, general, self._places, self._threads))
-        if not self._best.weight.size:
+        flown = fly_map(chosen.map, chosen.regions, chosen.seed, general, self._places, self._threads)
+        self._best = best = best_of(flown)
+        if not best.weight.size:
             raise ConfigError("no approach of these regions ends in a landing, whatever threshold and moment")
-        theta = np.array(start.values) if start is not None else fit(general, self._best)
-        self.state = _State(general.always_go(theta), n_flights=self._best.n_flights)
+        theta = np.array(start.values) if start is not None else fit(general, best)
+        self.state = _State(general.always_go(theta), n_flights=best.n_flights)
+        if start is None:
+            self._say("fit", 0.0)
+            most_Nmm = moment_most_Nmm(self._places)
+            timing_s = [part * chosen.map.timing_s for part in _TIMINGS_NORM]
+            found = polish(general, flown, best, theta, most_Nmm, timing_s, chosen.seed)
+            self._begin_with_the_best_of([theta, *found])
         self.state.candidates.append(self.state.theta)
-        self._say("map", 1.0)
+        self._say("fit", 1.0)
+
+    def _begin_with_the_best_of(self, policies: list[FloatArray]) -> None:
+        """Flights tell which of the policies that the map gives is the best."""
+        known, search = self._known(), self._chosen.search
+        approaches = Series(self._chosen.regions, self._chosen.seed, Purpose.START).next(search.n_approaches)
+        theta = np.stack(policies)
+        scores = objective(fly(self._places, self._general.form.name, theta, approaches, self._threads))
+        known.n_flights += len(self._places) * len(theta) * len(approaches)
+        known.theta = theta[int(np.argmax(scores))]
 
     def search(self) -> None:
         """Any learner, from there; keeps what it recommends now and then."""

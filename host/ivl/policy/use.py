@@ -91,9 +91,7 @@ def the_one(tasks: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return first
 
 
-def as_it_is(
-    policy: PolicyFile, learner: str | None, vary: Sequence[str] = ()
-) -> Callable[[dict[str, Any]], None]:
+def as_it_is(policy: PolicyFile, learner: str | None, vary: Sequence[str] = ()) -> Callable[[dict[str, Any]], None]:
     """A change of a sweep's raw data after which every trial flies the policy, or begins with it if a learner is named.
 
     Args:
@@ -128,6 +126,8 @@ def check_as_it_is(sweep: "Sweep", policy: PolicyFile, learner: str | None) -> N
     """
     if learner is None and sweep.learner.name != _NO_SEARCH:
         name = sweep.learner.name
-        raise ConfigError(f"learner.name: value {name!r}: --policy flies without a search (--learner {name} begins one)")
+        raise ConfigError(
+            f"learner.name: value {name!r}: --policy flies without a search (--learner {name} begins one)"
+        )
     if sweep.mu0_range is not None or (sweep.policy.form, sweep.policy.mu0) != (policy.form, policy.values):
         raise ConfigError("policy: --policy says the numbers, and a setting says others")

@@ -12,7 +12,7 @@ from ivl.cli import console, policy_options
 from ivl.cli.policy import survey_options
 from ivl.errors import ConfigError
 from ivl.policy import file
-from ivl.policy.file import NONE, PolicyFile
+from ivl.policy.file import NONE, PolicyFile, Score, Training, WithGo
 from ivl.policy.shape import General, is_general
 from ivl.policy.survey import survey
 
@@ -115,6 +115,14 @@ def _print(policy: PolicyFile) -> None:
     _line("form", f"{form.name}: {form.doc}")
     for p, value in zip(form.params, policy.values, strict=True):
         _line(f"  {p.name}", f"{value:.6g} {p.unit}")
+    _print_origin(policy)
+    found = _table(policy)
+    if found is not None:
+        _print_table(found)
+
+
+def _print_origin(policy: PolicyFile) -> None:
+    """Where the numbers come from, and how good they were found to be."""
     _line("checksum on a vehicle", f"{policy.checksum:08x}")
     if policy.digest == NONE:
         _line("digest", "none: written or changed by hand, so that origin and score need not be those of the numbers")
@@ -125,31 +133,32 @@ def _print(policy: PolicyFile) -> None:
         overrides = {name: setting["value"] for name, setting in told.pop("overrides", {}).items()}
         _line("learned on", ", ".join(f"{name} {value}" for name, value in {**told, **overrides}.items()))
     if policy.training is not None:
-        t = policy.training
-        _line("learned by", f"{t.learner.name}, seed {t.seed}, {t.rollouts} flights{', interrupted' * t.interrupted}")
-        if t.family is not None:
-            _line("learned over", f"{t.family.n_vehicles} vehicles drawn in place of each (seed {t.family.seed})")
-        for region in t.regions:
-            (v0, v1), (a0, a1) = region.speeds_mps, region.angles_deg
-            _line("approaches", f"{v0:g} to {v1:g} m/s, {a0:g} to {a1:g} degrees")
-        _line(
-            "objective",
-            f"{console.number(t.objective, 4)} (at the start {console.number(t.start_objective, 4)})",
-        )
+        _print_training(policy.training)
     if policy.score is not None:
-        s = policy.score
-        what = "every one flown" if s.with_go is not None else "none refused"
-        _line(
-            "score",
-            f"{console.percent(s.landed)} land, {console.percent(s.clean)} clean, of {s.flights} approaches, {what}",
-        )
-        if s.with_go is not None:
-            own = s.with_go
-            rates = f"{console.percent(own.landed)} land, {console.percent(own.clean)} clean"
-            _line("with go / no-go", f"{console.percent(own.refused)} of them are refused, {rates}")
-    found = _table(policy)
-    if found is None:
-        return
+        _print_score(policy.score)
+
+
+def _print_training(t: Training) -> None:
+    _line("learned by", f"{t.learner.name}, seed {t.seed}, {t.rollouts} flights{', interrupted' * t.interrupted}")
+    if t.family is not None:
+        _line("learned over", f"{t.family.n_vehicles} vehicles drawn in place of each (seed {t.family.seed})")
+    for region in t.regions:
+        (v0, v1), (a0, a1) = region.speeds_mps, region.angles_deg
+        _line("approaches", f"{v0:g} to {v1:g} m/s, {a0:g} to {a1:g} degrees")
+    _line("objective", f"{console.number(t.objective, 4)} (at the start {console.number(t.start_objective, 4)})")
+
+
+def _print_score(s: Score) -> None:
+    _line("score", f"{_rates(s)}, of {s.flights} approaches, {'every one flown' if s.with_go else 'none refused'}")
+    if s.with_go is not None:
+        _line("with go / no-go", f"{console.percent(s.with_go.refused)} of them are refused, {_rates(s.with_go)}")
+
+
+def _rates(of: Score | WithGo) -> str:
+    return f"{console.percent(of.landed)} land, {console.percent(of.clean)} clean"
+
+
+def _print_table(found: dict[str, Any]) -> None:
     for name, title, digits in (
         ("threshold_per_s", "R* (1/s) over v_x (m/s, to the right) and v_z (m/s, down)", 2),
         ("p_land", "probability of a landing", 2),
