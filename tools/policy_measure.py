@@ -40,10 +40,10 @@ QUICK = (
 """A small budget, for gears, forms and families."""
 OVER_BOX = ("regions=[box]", "search.n_approaches=60", "search.n_select=200")
 LONG = (
-    "regions=[box]", "search.n_iterations=30", "search.n_approaches=100", "search.n_select=400", "go.n_approaches=100",
+    "regions=[box]", "search.n_iterations=40", "search.n_approaches=100", "search.n_select=400", "go.n_approaches=100",
     "go.n_held_out=100",
 )  # fmt: skip
-"""Five times as many flights over the box, for what is hard to land."""
+"""Six times as many flights over the box, for what is hard to land."""
 ON = (
     "map.n_speeds=4", "map.n_angles=4", "map.n_thresholds=20", "map.moments_norm=[0.9]", "search.n_iterations=8",
     "search.n_approaches=50", "search.spread_per_s=0.15", "search.n_select=300", "go.n_approaches=100",
@@ -62,7 +62,12 @@ HARD = ("wide_long",)
 OTHER_FORMS = (("polynomial2", "wide_long"), ("bilinear", "wide_long"))
 FLOWN = ("vehicle=crazyflie21", "gear_set=table1")
 FORMS = ("polynomial2", "polynomial3", "bilinear")
-N_FAMILY, N_DRAWN = 6, 20
+FAMILY_ON = (
+    "regions=[box]", *ON[:4], "search.n_iterations=40", "search.spread_per_s=0.2", "go.n_approaches=100",
+    "go.n_held_out=100",
+)  # fmt: skip
+"""The search on from the policy of the nominal vehicle, with it or with drawn ones."""
+N_FAMILY, N_DRAWN, N_EACH = 24, 40, 100
 N_ONE_CLASS = 1000
 Data = dict[str, Any]
 FloatArray = npt.NDArray[np.float64]
@@ -265,39 +270,43 @@ def _constant(bench: Bench, chosen: general.GeneralExperiment) -> Data:
 
 
 def family(bench: Bench) -> Data:
-    """A policy of the nominal vehicle beside one of six drawn vehicles, on twenty drawn anew."""
+    """A policy of the nominal vehicle beside one of drawn vehicles, searched on from the same start."""
     found: Data = {}
-    shares = {}
     for gear in ("wide_long",):
+        begin = bench.learned(*LONG, *FLOWN, f"gear={gear}")
+        over_drawn = (f"family.n_vehicles={N_FAMILY}", "family.seed=1")
         policies = {
-            "nominal": bench.learned(*LONG, *FLOWN, f"gear={gear}"),
+            "nominal": bench.learned(*FAMILY_ON, *FLOWN, f"gear={gear}", *_shared_by(1), start=begin),
             "family": bench.learned(
-                *LONG, *QUICK[:3], *FLOWN, f"gear={gear}", f"family.n_vehicles={N_FAMILY}", "family.seed=1",
-                "search.n_approaches=17", "search.n_select=67",
+                *FAMILY_ON, *FLOWN, f"gear={gear}", *over_drawn, *_shared_by(N_FAMILY), start=begin
             ),
         }  # fmt: skip
         drawn = Family(n_vehicles=N_DRAWN, seed=SEED)
-        places = Place.of(policies["nominal"].tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
-        approaches = Series([BOX], SEED, Purpose.ASSESS).next(100)
-        row: Data = {}
+        places = Place.of(begin.tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
+        batches = Series([BOX], SEED, Purpose.ASSESS).for_each(len(places), N_EACH)
+        row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY}
+        landed: dict[str, FloatArray] = {}
         for name, policy in policies.items():
             bench.say(f"{N_DRAWN} vehicles, {gear}: {name}")
-            flown = fly(places, policy.form, General(policy.form).always_go(policy.values), approaches, bench.threads)
-            shares[name] = np.array([[four_leg(o).mean(), clean(o).mean()] for o in flown])
-            landed = np.sort(shares[name][:, 0])
+            flown = fly(places, policy.form, General(policy.form).always_go(policy.values), batches, bench.threads)
+            landed[name] = np.array([four_leg(o).mean() for o in flown])
             row[name] = {
                 **about(policy),
-                "landed": float(landed.mean()),
-                "clean": float(shares[name][:, 1].mean()),
-                "worst_tenth": float(landed[: -(-N_DRAWN // 10)].mean()),
+                "landed": float(landed[name].mean()),
+                "clean": float(np.mean([clean(o).mean() for o in flown])),
+                "worst_tenth": float(np.sort(landed[name])[: -(-N_DRAWN // 10)].mean()),
                 "nominal_box": over(bench, policy, "box")["box"],
             }
-        gain = shares["family"][:, 0] - shares["nominal"][:, 0]
+        gain = landed["family"] - landed["nominal"]
         half = float(student95(gain.size - 1) * gain.std(ddof=1) / np.sqrt(gain.size))
         row["gain"] = {"landed": float(gain.mean()), "half": half, "better": int((gain > 0).sum())}
-        row["vehicles"], row["flights"] = N_DRAWN, len(approaches)
         found[f"crazyflie21, table1, {gear}"] = row
     return found
+
+
+def _shared_by(n_vehicles: int) -> tuple[str, str]:
+    """The approaches of an iteration, and those of the choice, divided among vehicles."""
+    return f"search.n_approaches={192 // n_vehicles}", f"search.n_select={1200 // n_vehicles}"
 
 
 def one_class(bench: Bench) -> Data:

@@ -152,7 +152,8 @@ def _gears(found: Data) -> list[str]:
 def _family(found: Data) -> list[str]:
     rows, gains = [], []
     for name, row in found.items():
-        for which, title in (("nominal", "the vehicle of the files"), ("family", "six drawn vehicles")):
+        drawn = f"{row['learned_over']} drawn vehicles"
+        for which, title in (("nominal", "the vehicle of the files"), ("family", drawn)):
             of = row[which]
             rows.append((name, title, _pair(of), _rate(of["worst_tenth"]), _pair(of["nominal_box"])))
         gain = row["gain"]
@@ -171,9 +172,9 @@ def _family(found: Data) -> list[str]:
         _paragraph(
             "Only the files of the vehicles that fly, and those of Table I, say",
             "how uncertain their numbers are (`sigma`), so",
-            "this is `crazyflie21`. One policy was learned for the vehicle of the",
-            "files, one for six vehicles drawn from",
-            "them, with as many flights in the search. Both are judged over the box on the same",
+            "this is `crazyflie21`. A search went on from the policy of the table above, with the vehicle of the files,",
+            f"and with {first['learned_over']} vehicles drawn from them, each with approaches of its own; both had as many",
+            "flights. Both policies are judged over the box on the same",
             f"{first['vehicles']} vehicles drawn anew, {first['flights']}",
             "approaches each, landed / clean. The flight core of a",
             "drawn vehicle knows the mass, inertia and thrust of that vehicle.",

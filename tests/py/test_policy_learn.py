@@ -141,7 +141,10 @@ def test_a_family_takes_the_place_of_each_task_s_vehicle() -> None:
     assert found.training.family == Family(n_vehicles=3, seed=1)
     assert found.score.flights == 3 * 60
     members = Place.of(found.tasks[0]).members(Family(n_vehicles=3, seed=1), Purpose.FAMILY)
-    approaches = Series([Region.model_validate(regions[0])], 0, Purpose.SELECT).next(60)
+    # each vehicle has approaches of its own, which are many together
+    approaches = Series([Region.model_validate(regions[0])], 0, Purpose.SELECT).for_each(3, 60)
+    assert len(set(np.concatenate([batch.stream for batch in approaches]))) == 3 * 60
+    assert found.training.approaches == 3 * 3 * 8
     flown = fly(members, "polynomial2", General("polynomial2").always_go(found.values), approaches)
     assert found.score.landed == pytest.approx(np.mean([four_leg(o).mean() for o in flown]))
     assert found.sealed() == found
@@ -597,7 +600,7 @@ def test_the_help_of_an_assessment_says_what_is_flown_unless_told(capsys: Captur
     assert "trigger" not in text
 
 
-def test_an_assessment_says_which_vehicles_fly(by_hand: PolicyFile, learned: PolicyFile, tmp_path: Path) -> None:
+def test_an_assessment_says_which_vehicles_fly(learned: PolicyFile) -> None:
     assert learned.training is not None
     over = learned.training.model_copy(update={"family": Family(n_vehicles=6, seed=1)})
     family = file.make(learned.shape, learned.values, learned.tasks, over, learned.score)

@@ -166,7 +166,7 @@ def two_ridges(vx: np.ndarray, vz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return wide, wide - 0.09
 
 
-def map_of(general: General) -> start.Map:
+def ridges_map() -> start.Map:
     """A map that flew nothing: its landings lie on `two_ridges`."""
     edges = np.linspace(1.5, 3.5, 7), np.linspace(30.0, 90.0, 7)
     speed, angle = (axis.reshape(-1) for axis in np.meshgrid(*(0.5 * (e[1:] + e[:-1]) for e in edges), indexing="ij"))
@@ -188,7 +188,7 @@ def map_of(general: General) -> start.Map:
 def test_what_is_looked_up_in_a_map_is_what_its_flights_say() -> None:
     """Of policies with the same threshold everywhere, the map has flown each."""
     general = General("polynomial2")
-    flown = map_of(general)
+    flown = ridges_map()
     on_map = polish.OnMap(general, flown, 0.01)
     (smoothed,) = flown.smoothed()
     for i in (5, 22, 40):
@@ -202,7 +202,7 @@ def test_what_is_looked_up_in_a_map_is_what_its_flights_say() -> None:
 @pytest.mark.parametrize("name", ["polynomial2", "bilinear"])
 def test_a_start_from_the_map_does_not_go_between_two_ridges(name: str) -> None:
     general = General(name)
-    flown = map_of(general)
+    flown = ridges_map()
     best = start.best_of(flown)
     fitted = start.fit(general, best)
     on_map = polish.OnMap(general, flown, 0.005)
@@ -216,7 +216,7 @@ def test_a_start_from_the_map_does_not_go_between_two_ridges(name: str) -> None:
 
 def test_policies_on_a_map_of_several_moments_take_the_one_between() -> None:
     general = General("polynomial2")
-    flown = map_of(general)
+    flown = ridges_map()
     (outcomes,) = flown.flown
     hopeless = outcomes.copy()
     hopeless["n_legs"] = 0

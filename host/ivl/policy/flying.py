@@ -58,11 +58,22 @@ class Place:
 
 
 def fly(
-    places: Sequence[Place], form: str, theta: npt.ArrayLike, approaches: Approaches, threads: int | None = None
+    places: Sequence[Place],
+    form: str,
+    theta: npt.ArrayLike,
+    approaches: Approaches | Sequence[Approaches],
+    threads: int | None = None,
 ) -> list[Outcomes]:
     """Fly policies, shape (..., dim), over all approaches in each place.
 
     All policies meet the same approaches with the same random numbers.
+
+    Args:
+        places: Where.
+        form: Form of the policies.
+        theta: Their numbers.
+        approaches: The same in all places, or those of each place.
+        threads: Worker threads; omitted: all processors.
 
     Returns:
         Outcomes of each place, shape (..., n).
@@ -78,22 +89,27 @@ def fly_own(
 
 
 def _fly(
-    places: Sequence[Place], form: str, theta: FloatArray, approaches: Approaches, threads: int | None
+    places: Sequence[Place],
+    form: str,
+    theta: FloatArray,
+    approaches: Approaches | Sequence[Approaches],
+    threads: int | None,
 ) -> list[Outcomes]:
     """Fly policies whose shape (..., 1 or n, dim) meets that of the approaches, (n,)."""
     columns = np.moveaxis(theta, -1, 0)
+    batches = [approaches] * len(places) if isinstance(approaches, Approaches) else approaches
     return [
         place.world.rollouts(
-            approaches.speed_mps,
-            approaches.angle_deg,
+            batch.speed_mps,
+            batch.angle_deg,
             *columns,
             form=form,
-            seed=approaches.seed,
-            stream=approaches.stream,
+            seed=batch.seed,
+            stream=batch.stream,
             start=place.task.start,
             threads=threads,
         )
-        for place in places
+        for place, batch in zip(places, batches, strict=True)
     ]
 
 

@@ -15,7 +15,7 @@ from ivl.policy.file import PolicyFile, Score, Training, WithGo
 from ivl.policy.flying import Place, fly, objective
 from ivl.policy.general import GeneralExperiment
 from ivl.policy.polish import polish
-from ivl.policy.region import Approaches, Series
+from ivl.policy.region import Approaches, Region, Series
 from ivl.policy.shape import FloatArray, General
 from ivl.policy.start import best_of, fit, fly_map, moment_most_Nmm
 from ivl.seeds import Purpose
@@ -135,20 +135,21 @@ class _Run:
     def _begin_with_the_best_of(self, policies: list[FloatArray]) -> None:
         """Flights tell which of the policies that the map gives is the best."""
         known, search = self._known(), self._chosen.search
-        approaches = Series(self._chosen.regions, self._chosen.seed, Purpose.START).next(search.n_approaches)
+        approaches = self._draw(self._chosen.regions, Purpose.START, search.n_approaches)
         theta = np.stack(policies)
         scores = objective(fly(self._places, self._general.form.name, theta, approaches, self._threads))
-        known.n_flights += len(self._places) * len(theta) * len(approaches)
+        known.n_flights += len(theta) * sum(map(len, approaches))
         known.theta = theta[int(np.argmax(scores))]
 
     def search(self) -> None:
         """Any learner, from there; keeps what it recommends now and then."""
         known, n = self._known(), self._chosen.search.n_iterations
         before = known.n_flights
+        n_drawn = self._chosen.search.n_approaches * len(self._chosen.regions) * len(self._places)
 
         def keep(at: search.Iteration) -> None:
             known.theta, known.mean, known.n_flights = at.theta, at.mean, before + at.n_flights
-            known.n_approaches = at.number * self._chosen.search.n_approaches * len(self._chosen.regions)
+            known.n_approaches = at.number * n_drawn
             if at.number == n or at.number % max(1, n // _N_CHECKPOINTS) == 0:
                 known.candidates.append(at.theta)
             self._say("search", at.number / n)
@@ -169,28 +170,35 @@ class _Run:
         best = max(range(len(found)), key=lambda i: found[i][0])
         known.theta, known.start_objective, known.objective = known.candidates[best], found[0][0], found[best][0]
         _, landed, spotless = found[best]
-        known.score = Score(landed=landed, clean=spotless, flights=len(self._places) * len(approaches))
+        known.score = Score(landed=landed, clean=spotless, flights=sum(map(len, approaches)))
         self._say("choice", 1.0)
 
-    def _choosing(self) -> Approaches:
-        return Series(self._chosen.regions, self._chosen.seed, Purpose.SELECT).next(self._chosen.search.n_select)
+    def _draw(self, regions: list[Region], purpose: Purpose, n: int) -> list[Approaches]:
+        """Approaches of a purpose, for each place."""
+        return Series(regions, self._chosen.seed, purpose).for_each(len(self._places), n)
 
-    def _rates(self, theta: FloatArray, approaches: Approaches) -> tuple[list[Outcomes], float, float]:
+    def _choosing(self) -> list[Approaches]:
+        return self._draw(self._chosen.regions, Purpose.SELECT, self._chosen.search.n_select)
+
+    def _rates(self, theta: FloatArray, approaches: list[Approaches]) -> tuple[list[Outcomes], float, float]:
         """Outcomes of a policy, and its shares of landings and of clean ones."""
         flown = fly(self._places, self._general.form.name, theta, approaches, self._threads)
-        self._known().n_flights += len(self._places) * len(approaches)
+        self._known().n_flights += sum(map(len, approaches))
         landed, spotless = (float(np.mean([rate(o).mean() for o in flown])) for rate in (four_leg, clean))
         return flown, landed, spotless
 
     def learn_go(self) -> None:
         """Probability of a landing, the least one that is flown, and what this does to the score."""
         known, general, settings = self._known(), self._general, self._chosen.go
-        series = [Series([settings.region], self._chosen.seed, purpose) for purpose in (Purpose.GO, Purpose.HELD_OUT)]
+        drawn = [
+            self._draw([settings.region], purpose, n)
+            for purpose, n in ((Purpose.GO, settings.n_approaches), (Purpose.HELD_OUT, settings.n_held_out))
+        ]
         self._say("go / no-go", 0.0)
         theta = _rounded(known.theta)
-        learned = go.fly_decisions(general, self._places, theta, series[0].next(settings.n_approaches), self._threads)
+        learned = go.fly_decisions(general, self._places, theta, drawn[0], self._threads)
         self._say("go / no-go", 0.6)
-        held = go.fly_decisions(general, self._places, theta, series[1].next(settings.n_held_out), self._threads)
+        held = go.fly_decisions(general, self._places, theta, drawn[1], self._threads)
         known.n_flights += 2 * (learned.n_flights + held.n_flights)
         if learned.landed.all() or not learned.landed.any():
             self._say("go / no-go", 1.0)

@@ -1,6 +1,7 @@
 """The search from the map's policy on, by any learner of the project.
 
 In each iteration all candidates fly the same new approaches, so that they differ in what they are, not in their luck.
+Each place has approaches of its own: with few of them, the same for all vehicles of a family, luck would be in those.
 """
 
 from collections.abc import Callable, Sequence
@@ -96,10 +97,10 @@ def run(
             return
         asked = learner.ask()
         theta = _whole(general, start, asked)
-        approaches = series.next(settings.n_approaches)
+        approaches = series.for_each(len(places), settings.n_approaches)
         scores = objective(fly(places, general.form.name, theta, approaches, threads))
         learner.tell(asked, scores)
-        n_flights += len(places) * len(theta) * len(approaches)
+        n_flights += len(theta) * sum(map(len, approaches))
         recommended = _whole(general, start, learner.result.recommended)
         on_iteration(Iteration(number, recommended, float(scores.mean()), float(scores.max()), n_flights))
 

@@ -156,7 +156,7 @@ class Room:
         level_out = None
         if vehicle.phase == Phase.LEVEL_OUT:
             level_out = end_level_out(vehicle, self._world.surface)
-            if vehicle.phase == Phase.ABORTED:
+            if vehicle.aborted_by:
                 vehicle.wait(self._is_over, _END_S, "landing after an abort in the level-out")
         vehicle.pause(_SETTLE_S)
         self._restore_tumble_check()
