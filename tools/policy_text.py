@@ -172,10 +172,9 @@ def _family(found: Data) -> list[str]:
         _paragraph(
             "Only the files of the vehicles that fly, and those of Table I, say",
             "how uncertain their numbers are (`sigma`), so",
-            "this is `crazyflie21`. A search went on from the policy of the table above, with the vehicle of the files,",
-            f"and with {first['learned_over']} vehicles drawn from them, each with approaches of its own; both had as many",
-            "flights. Both policies are judged over the box on the same",
-            f"{first['vehicles']} vehicles drawn anew, {first['flights']}",
+            "this is `crazyflie21`. One policy was learned for the vehicle of the files, and one for",
+            f"{first['learned_over']} vehicles drawn from them, with as many flights in the search. Both are judged",
+            f"over the box on the same {first['vehicles']} vehicles drawn anew, {first['flights']}",
             "approaches each, landed / clean. The flight core of a",
             "drawn vehicle knows the mass, inertia and thrust of that vehicle.",
         ),
