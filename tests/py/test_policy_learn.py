@@ -150,6 +150,27 @@ def test_a_family_takes_the_place_of_each_task_s_vehicle() -> None:
     assert found.sealed() == found
 
 
+def test_vehicles_do_not_share_their_approaches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few approaches of each of many vehicles would else be few approaches."""
+    task = {**tiny()["tasks"][0], "vehicle": "crazyflie21", "gear": "wide_long", "gear_set": "table1"}
+    met: dict[tuple[int, int], int] = {}
+    flown: list[int] = []
+
+    def spy(places: list[Place], form: str, theta: Any, approaches: Any, threads: Any = None) -> Any:
+        flown.append(len(places))
+        for place, batch in zip(places, approaches, strict=True):
+            for stream in batch.stream:
+                assert met.setdefault((batch.seed, int(stream)), id(place)) == id(place)
+        return fly(places, form, theta, approaches, threads)
+
+    for module in ("search", "learn", "go"):
+        monkeypatch.setattr(f"ivl.policy.{module}.fly", spy)
+    regions = [{"speeds_mps": [3.0, 3.5], "angles_deg": [75.0, 90.0]}]
+    learn(tiny_experiment(tasks=[task], family={"n_vehicles": 3}, regions=regions))
+    assert set(flown) == {3}
+    assert len(met) > 3 * (3 * 8 + 60 + 200 + 100)
+
+
 def test_a_family_of_a_vehicle_without_sigmas_is_said() -> None:
     with pytest.raises(ConfigError, match="family: vehicle habas2021, gear as_simulated/wide_short: no parameter has"):
         learn(tiny_experiment(family={"n_vehicles": 2}))
