@@ -70,7 +70,7 @@ class Room:
         return preflight.checks(self._vehicle)
 
     def prove(self, fly: Callable[[Rollout], Outcome]) -> None:
-        """Nothing: nobody knows what must come of a landing."""
+        """Do nothing: nobody knows what must come of a landing."""
 
     def leave(self) -> None:
         """Bring the vehicle down and disarm it, and say what was done."""
@@ -83,11 +83,11 @@ class Room:
     # ---- recovery
 
     def after_refusal(self) -> None:
-        """Down: the next policy is flown from the floor."""
+        """Bring the vehicle down: the next policy is flown from the floor."""
         self._come_down()
 
     def after_fault(self) -> None:
-        """Down first; then a new connection, to be sure."""
+        """Bring the vehicle down; a new connection follows, to be sure."""
         self._come_down()
 
     # ---- a landing
