@@ -80,7 +80,10 @@ def outcome_of_flight(
 
 
 def note_no_go(outcome: np.ndarray[Any, np.dtype[np.void]], called_off: LevelOut, world: World) -> None:
-    """Write into an outcome of shape (1,) that its approach was called off; the recorder has only the end of it."""
+    """Write into an outcome of shape (1,) that its approach was called off.
+
+    The recorder has the highest point of a level-out that is short enough; the vehicle's logs have that of any.
+    """
     outcome["no_go"], outcome["end_reason"] = 1, _end_code("no_go")
     gap_m = world.params.values["world.ceiling_height"] - called_off.highest_m
     outcome["d_min_m"] = np.fmin(outcome["d_min_m"], gap_m)
