@@ -28,7 +28,7 @@
     X(u32, policy_crc, "its checksum")                                           \
     X(f32, tick_hz, "rows per second")                                           \
     X(f32, thrust_N_max, "thrust that 255 stands for, N")                        \
-    X(u32, t_trigger_us, "low 32 bits of the clock at trigger_row")
+    X(u32, t_trigger_us, "low 32 bits of t_us at trigger_row")
 
 /// Row: X(type, name, count, per_unit, unit, doc); value in `unit` = number / per_unit, limited to the range of the type
 #define IVL_RECORD_ROW(X)                                                        \
