@@ -258,7 +258,7 @@ CONDITION(would_not_land)
     /* the trigger */                                                                             \
     X(with, NO_POLICY,     "no_policy",     APPROACH,      no_policy,          HOLD,   DISCARDS)  \
     X(with, ONE_SHOT,      "one_shot",      APPROACH,      has_triggered,      HOLD,   SCORED)    \
-    /* the policy expects no landing, at the trigger or at the last moment; a command that is not fresh does not hold it up */ \
+    /* the policy expects no landing, or there is no cue at the last moment; a command that is not fresh does not hold it up */ \
     X(with, NO_GO,         "no_go",         APPROACH,      would_not_land,     LEVEL,  SCORED)    \
     X(with, NOT_FRESH,     "not_fresh",     APPROACH,      not_this_tick,      HOLD,   SCORED)    \
     X(with, CUE,           "cue",           APPROACH,      cue_invalid,        HOLD,   SCORED)
@@ -278,6 +278,7 @@ static const row_t ROWS[] = {RULES(ROW, )};
 
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_RULE_COUNT, "one row a rule");
 _Static_assert(IVL_RULE_COUNT <= 255, "a rule is logged in one byte");
+_Static_assert(IVL_PHASE_COUNT <= 16, "a row has one bit a phase");
 
 // bits of the rows that name a phase: the others need no look
 #define BIT_IF(with, id, name, phases, when, act, discards) | ((((phases) & (with)) != 0u) ? 1u << IVL_RULE_##id : 0u)

@@ -79,7 +79,9 @@ def outcome_of_flight(
 
 
 def note_no_go(outcome: np.ndarray[Any, np.dtype[np.void]], nearest_m: float, aborted: bool) -> None:
-    """Write into an outcome of shape (1,) that its approach was called off; the recorder has only the end of it.
+    """Write into an outcome of shape (1,) that its approach was called off.
+
+    The recorder has the highest point of a level-out that is short enough; the vehicle's logs have that of any.
 
     Args:
         outcome: What recorder and operator tell.
