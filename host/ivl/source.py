@@ -72,9 +72,7 @@ class RolloutSource(Protocol):
 class WorldSource:
     """The simulator in this process: a whole plan in one native batch."""
 
-    def __init__(
-        self, world: World, experiment: Experiment, threads: int | None = None, record: bool = False
-    ) -> None:
+    def __init__(self, world: World, experiment: Experiment, threads: int | None = None, record: bool = False) -> None:
         """Fly the experiment's approach in `world`; `record`: give what each flip recorded, too."""
         self.world, self._experiment, self._threads, self._record = world, experiment, threads, record
         self.warnings: list[str] = []

@@ -56,7 +56,7 @@ class Bank:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
             np.savez_compressed(file, z=self.z, theta=self.theta, landed=self.landed, features=self.features)
-        os.replace(file.name, path)
+        Path(file.name).replace(path)
 
     @staticmethod
     def load(path: Path) -> "Bank":
@@ -125,12 +125,10 @@ def derive_member(seed: int, i: int) -> int:
     return int(np.random.SeedSequence([seed, i]).generate_state(1, np.uint64)[0])
 
 
-def _fly(
-    flight: Flight, world: World, theta: FloatArray, seed: int
-) -> tuple[npt.NDArray[np.bool_], FloatArray]:
+def _fly(flight: Flight, world: World, theta: FloatArray, seed: int) -> tuple[npt.NDArray[np.bool_], FloatArray]:
     """Landings and recordings of one member."""
     landed, features = np.zeros(len(theta), dtype=bool), np.empty((len(theta), recording.N))
     for k, policy in enumerate(theta):
         features[k], outcome = recording.simulated(world, flight, policy, seed, k)
-        landed[k] = bool(valid(outcome) and four_leg(outcome))
+        landed[k] = bool((valid(outcome) & four_leg(outcome)).all())
     return landed, features

@@ -64,7 +64,8 @@ def safest(
     belief: Belief, corrected: Correction, bounds: FloatArray, rng: np.random.Generator
 ) -> tuple[FloatArray, float]:
     """The policy of the largest margin rate, shape (2,), and that rate."""
-    axes = np.linspace(*bounds[0], _N_RREV), np.linspace(*bounds[1], _N_MOMENT)
+    sizes = (_N_RREV, _N_MOMENT)
+    axes = tuple(np.linspace(lo, hi, size) for (lo, hi), size in zip(bounds.tolist(), sizes, strict=True))
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     surface = rate(belief, corrected, grid).reshape(_N_RREV, _N_MOMENT)
     points, weights = around(grid, bounds)

@@ -2,7 +2,7 @@
 
 Fitted to a bank (`ivl.belief.bank`). u are the numbers of the member and of the policy, scaled.
 
-    recording     features = A(u) + b + e; A all products of two of u, b of the member, e of the flight: ridge regression;
+    recording     features = A(u) + b + e; A all products of two of u, b of the member, e of the flight;
                   the covariances of b (between members: what the emulator does not know) and e (equal flights) are
                   those of its residuals
     landing       P(landed | u): a mean of small neural networks (scikit-learn), each from its own seed
@@ -31,6 +31,7 @@ _USED_INDEX = np.array([recording.NAMES.index(name) for name in USED])
 _RIDGE = 3.0
 _LEAST_SHARE, _LEAST_BETWEEN = 1e-3, 0.01
 _NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 30, 0.3
+_BATCH, _RATE = 400, 2e-3
 
 
 def used(features: FloatArray) -> FloatArray:
@@ -155,7 +156,7 @@ class LandingEmulator:
         u = self.inputs(z, theta, battery_V).astype(np.float32)
         total = np.zeros(len(u))
         for net in self.nets:
-            h = u
+            h: npt.NDArray[np.float32] = u
             for number, (weight, bias) in enumerate(net):
                 h = h @ weight + bias
                 if number + 1 < len(net):
@@ -168,15 +169,21 @@ def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> La
     """Neural networks on the landings of a bank."""
     n, m = bank.landed.shape
     flights = (
-        np.repeat(bank.z, m, axis=0), bank.theta.reshape(n * m, -1), bank.features[..., recording.BATTERY].reshape(n * m)
-    )  # fmt: skip
+        np.repeat(bank.z, m, axis=0),
+        bank.theta.reshape(n * m, -1),
+        bank.features[..., recording.BATTERY].reshape(n * m),
+    )
     expected = recordings.mean(*flights)
     emulator = LandingEmulator(recordings, expected.mean(axis=0), expected.std(axis=0), [])
     x, y = emulator.inputs(*flights), bank.landed.ravel()
     nets = []
     for number in range(_NETS):
-        net = MLPClassifier(_HIDDEN, alpha=_PENALTY, batch_size=400, learning_rate_init=2e-3, random_state=seed + number)
+        net = MLPClassifier(
+            _HIDDEN, alpha=_PENALTY, batch_size=400, learning_rate_init=2e-3, random_state=seed + number
+        )
         for _ in range(_EPOCHS):
             net.partial_fit(x, y, classes=[False, True])
-        nets.append([(w.astype(np.float32), b.astype(np.float32)) for w, b in zip(net.coefs_, net.intercepts_, strict=True)])
+        nets.append(
+            [(w.astype(np.float32), b.astype(np.float32)) for w, b in zip(net.coefs_, net.intercepts_, strict=True)]
+        )
     return LandingEmulator(recordings, emulator.centre, emulator.spread, nets)

@@ -160,9 +160,7 @@ class Belief:
         n, cumulative = len(weights), np.cumsum(weights) / weights.sum()
         return np.minimum(np.searchsorted(cumulative, (np.arange(n) + self._rng.random()) / n), n - 1)
 
-    def _move(
-        self, evidence: Evidence, new: FloatArray, old: FloatArray, done: float
-    ) -> tuple[FloatArray, FloatArray]:
+    def _move(self, evidence: Evidence, new: FloatArray, old: FloatArray, done: float) -> tuple[FloatArray, FloatArray]:
         """One step of each particle towards the tempered posterior; log-likelihoods after and before the flights."""
         beta = np.minimum(self._beta * self._rng.choice(_BETA_FACTORS, (len(self.z), 1)), _BETA_MAX)
         proposal = np.sqrt(1.0 - beta**2) * self.z + beta * self._rng.standard_normal(self.z.shape)

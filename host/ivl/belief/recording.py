@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl.flight.motion import Flip
+from ivl.outcome import Outcomes
 from ivl.world import Trace, World
 
 FloatArray = npt.NDArray[np.float64]
@@ -60,9 +61,7 @@ class Flight:
     bounds: FloatArray
 
 
-def simulated(
-    world: World, flight: Flight, theta: FloatArray, seed: int, stream: int
-) -> tuple[FloatArray, np.record]:
+def simulated(world: World, flight: Flight, theta: FloatArray, seed: int, stream: int) -> tuple[FloatArray, Outcomes]:
     """Fly one rollout and record it as a vehicle does.
 
     Args:
@@ -73,13 +72,15 @@ def simulated(
         stream: Number of the rollout within the seed.
 
     Returns:
-        Features, shape (N,), and the outcome record.
+        Features, shape (N,), and the outcome, shape (1,).
     """
     trace = world.trace(
         flight.speed_mps, flight.angle_deg, *theta.tolist(), form=flight.form, start=flight.start,
         seed=seed, stream=stream, period_s=_TRACE_PERIOD_S,
     )  # fmt: skip
-    return of_trace(world, trace, np.random.Generator(np.random.PCG64([seed, stream]))), trace.outcome
+    return of_trace(world, trace, np.random.Generator(np.random.PCG64([seed, stream]))), np.atleast_1d(
+        np.asarray(trace.outcome)
+    ).view(np.recarray)
 
 
 def of_trace(world: World, trace: Trace, rng: np.random.Generator) -> FloatArray:
@@ -114,12 +115,17 @@ def of_flip(flip: Flip, h_plane_m: float) -> FloatArray:
 
 
 def _features(
-    t_s: FloatArray, pitch: FloatArray, rate: FloatArray, fall: FloatArray, closing: FloatArray, contact_s: float,
+    t_s: FloatArray,
+    pitch: FloatArray,
+    rate: FloatArray,
+    fall: FloatArray,
+    closing: FloatArray,
+    contact_s: float,
     battery_V: float,
 ) -> FloatArray:
     """Signals at the times of the features; NaN after the contact and after the end of the recording."""
     end_s = contact_s if np.isfinite(contact_s) else _LAST_S
-    seen = TIMES_S <= min(end_s, float(t_s[-1]))
+    seen = min(end_s, float(t_s[-1])) >= TIMES_S
     clip = _CLIP_SHARE * _GYRO_FULL_RADPS
     signals = (pitch, np.clip(rate, -clip, clip), fall)
     at_times = [np.where(seen, np.interp(TIMES_S, t_s, signal), np.nan) for signal in signals]

@@ -54,7 +54,7 @@ LEARNERS: dict[str, Entry] = {
         {"n_best": 2},
     ),
     "ephe_robust": Entry(RobustEPHE, "EPHE with above-mean weights and a limit on how fast sigma may shrink"),
-    "ephe_belief": Entry(EpheBelief, "EPHE on a belief over simulated vehicles: fewest failed landings on an unknown vehicle"),
+    "ephe_belief": Entry(EpheBelief, "EPHE on a belief over simulated vehicles: the first flights land"),
     "ephe_memory": Entry(EpheMemory, "EPHE on rollouts imagined from a memory of all that was flown"),
     "cmaes": Entry(CMALearner, "CMA-ES of the cmaes package"),
     "cmaes_lr": Entry(CMALearner, "CMA-ES of the cmaes package with learning-rate adaptation", {"lr_adapt": True}),

@@ -50,6 +50,7 @@ class EpheBelief(EpheMemory):
 
     def _setup(self) -> None:
         super()._setup()
+        self._bounds = np.stack([self.lo, self.hi], axis=1)
         self._belief: Belief | None = None
         self._theta, self._features = np.empty((0, self.dim)), np.empty((0, len(emulator.USED)))
         self._told, self._battery_V, self._foreseen = np.empty(0, dtype=bool), np.empty(0), np.empty(0)
@@ -58,7 +59,6 @@ class EpheBelief(EpheMemory):
         """Start from simulated vehicles; before the first `ask` or `load_state_dict`."""
         trust = Trust(lapse=self.options.lapse, discrepancy=self.options.discrepancy)
         self._belief = simulator.belief(self._rng, self.options.n_particles, trust)
-        self._bounds = np.stack([self.lo, self.hi], axis=1)
         self._imagined = (self.mu0, self.sigma0)
         self._decide()
 
@@ -89,7 +89,7 @@ class EpheBelief(EpheMemory):
 
     def _decide(self) -> None:
         """The correction, the policy of the largest margin rate, and (mu, sigma)."""
-        assert self._belief is not None  # noqa: S101  (only asked with one)
+        assert self._belief is not None
         options = self.options
         size = options.local * (1.0 if self.model_fits else options.wide)
         expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)
@@ -99,7 +99,7 @@ class EpheBelief(EpheMemory):
 
     def _remember(self, theta: FloatArray, rewards: FloatArray, meta: Meta) -> None:
         """Add flights to the evidence, with what was expected of them."""
-        assert self._belief is not None  # noqa: S101
+        assert self._belief is not None
         features = np.asarray(meta.get(RECORDING, np.full((len(rewards), recording.N), np.nan)), dtype=np.float64)
         landed = meta[LANDED].astype(bool) if LANDED in meta else rewards > rewards.max() / 2.0
         self._foreseen = np.append(self._foreseen, decide.rate(self._belief, self._corrected, theta))
@@ -113,7 +113,7 @@ class EpheBelief(EpheMemory):
 
     def _imagine_on_belief(self, mu: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
         """EPHE from where it stands; from the belief's best policy where that is expected to land more often."""
-        assert self._belief is not None  # noqa: S101
+        assert self._belief is not None
         options, floor = self.options, self.options.floor * self.sigma0
         starts = [(mu, np.maximum(sigma, 0.5 * self.sigma0)), (self._choice, 0.5 * self.sigma0)]
         found = [
@@ -150,13 +150,13 @@ class EpheBelief(EpheMemory):
         }
 
     def _load(self, state: Mapping[str, Any]) -> None:
-        belief, bounds = self._belief, getattr(self, "_bounds", None)
+        belief = self._belief
         super()._load(state)
         if "belief" not in state:
             return
         if belief is None:
             raise ValueError("it began with a simulator, and none is given")
-        self._belief, self._bounds = belief, bounds
+        self._belief = belief
         self._theta = np.array(state["theta"], dtype=np.float64).reshape(-1, self.dim)
         self._features = np.array(state["features"], dtype=np.float64).reshape(-1, len(emulator.USED))
         self._battery_V = np.array(state["battery_V"], dtype=np.float64)
@@ -174,4 +174,6 @@ class EpheBelief(EpheMemory):
 
 def _plain(values: FloatArray) -> list[Any]:
     """Plain data for JSON, None for NaN."""
-    return np.where(np.isfinite(values), values.astype(object), None).tolist()  # type: ignore[no-any-return]
+    plain = values.astype(object)
+    plain[~np.isfinite(values)] = None
+    return list(plain.tolist())

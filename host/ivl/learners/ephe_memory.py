@@ -56,7 +56,9 @@ class EpheMemory(BOLearner):
         super()._update(theta, rewards, meta)
         width = np.minimum(self.options.jitter * self._hyper.lengths, 1.0)
         starts = [(self._mu, np.maximum(self._sigma, width)), (self._best, width)]
-        self._mu, self._sigma = max((self._imagine(*start) for start in starts), key=lambda d: self._worth(d[0][None])[0])
+        self._mu, self._sigma = max(
+            (self._imagine(*start) for start in starts), key=lambda d: self._worth(d[0][None])[0]
+        )
 
     def _imagine(self, mu: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Where EPHE goes from a distribution on imagined rollouts, equations (1) to (3)."""
@@ -75,7 +77,7 @@ class EpheMemory(BOLearner):
 
     def _worth(self, theta: FloatArray) -> FloatArray:
         """What the model expects, less its doubt, shape (n,)."""
-        assert self._gp is not None  # noqa: S101  (only asked after an update)
+        assert self._gp is not None
         mean, sd = self._gp.predict(theta)
         return np.asarray(mean - self.options.caution * sd)
 

@@ -123,7 +123,13 @@ class LearningRun:
             rows = still[flown.index]
             terms = self._first.reward.score(flown.outcomes)
             self._recorder.score(
-                episode, rollouts.trial[rows], rollouts.idx[rows], flown.outcomes, terms, flown.discarded, flown.recordings
+                episode,
+                rollouts.trial[rows],
+                rollouts.idx[rows],
+                flown.outcomes,
+                terms,
+                flown.discarded,
+                flown.recordings,
             )
             self._n_flown += len(rows)
 

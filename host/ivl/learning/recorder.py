@@ -34,7 +34,7 @@ class RolloutRows:
         reward: Return, shape (n,), NaN if not flown.
         outcomes: Outcome records, shape (n,); NaN and zero if not flown.
         terms: Terms of the return by name, shape (n,) each, NaN if not flown.
-        recordings: What each recorded of its flip, shape (n, `ivl.belief.recording.N`), NaN where nothing was; None: the
+        recordings: What each recorded of its flip, shape (n, `ivl.belief.recording.N`), NaN where nothing; None: the
             recorder keeps none.
     """
 
