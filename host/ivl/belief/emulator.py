@@ -10,6 +10,7 @@ Fitted to a bank (`ivl.belief.bank`). u are the numbers of the member and of the
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -156,7 +157,7 @@ class LandingEmulator:
         u = self.inputs(z, theta, battery_V).astype(np.float32)
         total = np.zeros(len(u))
         for net in self.nets:
-            h: npt.NDArray[np.float32] = u
+            h: npt.NDArray[Any] = u
             for number, (weight, bias) in enumerate(net):
                 h = h @ weight + bias
                 if number + 1 < len(net):
@@ -179,7 +180,7 @@ def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> La
     nets = []
     for number in range(_NETS):
         net = MLPClassifier(
-            _HIDDEN, alpha=_PENALTY, batch_size=400, learning_rate_init=2e-3, random_state=seed + number
+            _HIDDEN, alpha=_PENALTY, batch_size=min(_BATCH, len(y)), learning_rate_init=_RATE, random_state=seed + number
         )
         for _ in range(_EPOCHS):
             net.partial_fit(x, y, classes=[False, True])

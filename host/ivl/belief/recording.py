@@ -78,9 +78,8 @@ def simulated(world: World, flight: Flight, theta: FloatArray, seed: int, stream
         flight.speed_mps, flight.angle_deg, *theta.tolist(), form=flight.form, start=flight.start,
         seed=seed, stream=stream, period_s=_TRACE_PERIOD_S,
     )  # fmt: skip
-    return of_trace(world, trace, np.random.Generator(np.random.PCG64([seed, stream]))), np.atleast_1d(
-        np.asarray(trace.outcome)
-    ).view(np.recarray)
+    rng = np.random.Generator(np.random.PCG64([seed, stream]))
+    return of_trace(world, trace, rng), np.atleast_1d(np.asarray(trace.outcome)).view(np.recarray)
 
 
 def of_trace(world: World, trace: Trace, rng: np.random.Generator) -> FloatArray:

@@ -22,7 +22,7 @@ from ivl.belief.posterior import Belief, Trust
 from ivl.belief.recording import Flight
 from ivl.family import Family
 
-_MEMBERS, _FLIGHTS, _SEED = 2400, 16, 20210701
+MEMBERS, _FLIGHTS, _SEED = 2400, 16, 20210701
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Simulator:
     def of(
         kin: Family,
         flight: Flight,
-        n_members: int = _MEMBERS,
+        n_members: int | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> "Simulator":
@@ -54,10 +54,11 @@ class Simulator:
         Args:
             kin: The family.
             flight: What is flown.
-            n_members: Members of the bank.
+            n_members: Members of the bank; omitted: `MEMBERS`.
             threads: Worker threads; omitted: all processors.
             progress: Called with (members flown, members), if the bank is flown.
         """
+        n_members = MEMBERS if n_members is None else n_members
         path = cache_folder() / f"bank-{_digest(kin, flight, n_members)}.npz"
         if path.exists():
             flown = Bank.load(path)

@@ -37,7 +37,7 @@ class EpheBeliefOptions(EpheMemoryOptions):
     alarm: float = Field(default=-2.2, lt=0, description="sum of surprises below which the belief is given up")
     local: float = Field(default=1.0, gt=0, le=10, description="size of the local correction, in logits")
     wide: float = Field(default=3.0, ge=1, le=10, description="factor on that size while the alarm is on")
-    length: float = Field(default=0.2, gt=0, le=10, description="its lengths, in units of sigma0")
+    local_length: float = Field(default=0.2, gt=0, le=10, description="its lengths, in units of sigma0")
     discrepancy: float = Field(default=1.0, ge=0, le=10, description="factor on the errors allowed to any model")
 
 
@@ -93,7 +93,7 @@ class EpheBelief(EpheMemory):
         options = self.options
         size = options.local * (1.0 if self.model_fits else options.wide)
         expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)
-        self._corrected = correction.fit(self._theta, self._told, expected, options.length * self.sigma0, size)
+        self._corrected = correction.fit(self._theta, self._told, expected, options.local_length * self.sigma0, size)
         self._choice, self._margin_rate = decide.safest(self._belief, self._corrected, self._bounds, self._rng)
         self._imagined = self._imagine_on_belief(*self._imagined)
 
@@ -169,7 +169,9 @@ class EpheBelief(EpheMemory):
         self._belief.load(state["belief"], self._evidence() if len(self._theta) else None)
         size = self.options.local * (1.0 if self.model_fits else self.options.wide)
         expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)
-        self._corrected = correction.fit(self._theta, self._told, expected, self.options.length * self.sigma0, size)
+        self._corrected = correction.fit(
+            self._theta, self._told, expected, self.options.local_length * self.sigma0, size
+        )
 
 
 def _plain(values: FloatArray) -> list[Any]:

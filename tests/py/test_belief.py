@@ -1,0 +1,452 @@
+"""The belief over simulated vehicles: recordings, bank, emulators, posterior, decision, and the learner on it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.special import expit, logit
+
+from ivl import experiment, family, run
+from ivl.belief import bank, correction, decide, emulator, posterior, recording
+from ivl.belief.posterior import Belief, Evidence, Trust
+from ivl.belief.recording import Flight
+from ivl.belief.simulator import Simulator
+from ivl.family import Family, FamilyChoice, Spread
+from ivl.learners import EpheBelief, make_learner
+from ivl.learners.base import LANDED, RECORDING
+from ivl.outcome import four_leg
+from ivl.world import World
+
+BOUNDS = np.array([[0.0, 7.0], [0.0, 10.65]])
+FLIGHT = Flight(2.5, 90.0, "constant", "imparted", BOUNDS)
+CHOICE = FamilyChoice(
+    parameters={
+        "body.mass": Spread(share=0.05, source="test"),
+        "rotor.thrust_gain": Spread(share=0.05, source="test"),
+        "leg.stiffness": Spread(share=0.2, source="test"),
+    }
+)
+N_USED = len(emulator.USED)
+
+
+@pytest.fixture(scope="module")
+def kin() -> Family:
+    return family.of(World("habas2021", "wide_short", "as_simulated"), CHOICE)
+
+
+@pytest.fixture(scope="module")
+def simulator(kin: Family, tmp_path_factory: pytest.TempPathFactory) -> Simulator:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        return Simulator.of(kin, FLIGHT, n_members=80)
+
+
+def belief_of(
+    recordings: emulator.RecordingEmulator, kin: Family, seed: int = 1, n: int = 400, **trust: float
+) -> Belief:
+    """A belief over recordings alone: landings are as likely as not, whatever is flown."""
+    landings = emulator.LandingEmulator(recordings, np.zeros(N_USED), np.ones(N_USED), [])
+    rng = np.random.Generator(np.random.PCG64(seed))
+    return Belief(recordings, landings, kin, n, rng, Trust(**trust))
+
+
+class Even(emulator.LandingEmulator):
+    """A landing emulator that knows nothing."""
+
+    def rate(self, z: np.ndarray, theta: np.ndarray, battery_V: np.ndarray) -> np.ndarray:  # noqa: ARG002
+        return np.full(len(z), 0.5)
+
+
+# ---- recordings
+
+
+def test_a_recording_is_the_motion_after_the_trigger_up_to_the_contact(kin: Family) -> None:
+    features, outcome = recording.simulated(kin.world, FLIGHT, np.array([4.5, 8.0]), seed=3, stream=0)
+    trace = kin.world.trace(2.5, 90.0, 4.5, 8.0, seed=3, stream=0, period_s=0.005)
+    contact_s = float(outcome["t_impact_s"][0] - outcome["t_trigger_s"][0])
+    told = recording.table(features)
+    assert told["contact_time"] == pytest.approx(contact_s, abs=0.008)
+    for ms in (50, 90):
+        true = np.interp(outcome["t_trigger_s"][0] + ms / 1000, trace.rows["t_s"], trace.rows["pitch_deg"])
+        assert told[f"pitch_{ms:03d}"] == pytest.approx(true, abs=1.5)
+    assert told["closing"] == pytest.approx(2.5, abs=0.1)
+    late = [name for name in recording.NAMES if name.endswith("_230")] if contact_s < 0.23 else ["hanging"]
+    assert contact_s < 0.25
+    assert not any(name in told for name in late)
+    assert "battery" not in told  # this vehicle has none
+    again, _ = recording.simulated(kin.world, FLIGHT, np.array([4.5, 8.0]), seed=3, stream=0)
+    assert np.array_equal(features, again, equal_nan=True)
+
+
+def test_a_flight_without_a_trigger_records_nothing(kin: Family) -> None:
+    never = Flight(0.5, 20.0, "constant", "imparted", BOUNDS)
+    features, outcome = recording.simulated(kin.world, never, np.array([20.0, 5.0]), seed=3, stream=0)
+    assert not outcome["triggered"][0]
+    assert np.isnan(features).all()
+
+
+def test_the_gyro_clips_what_is_recorded(kin: Family) -> None:
+    rates = [name.startswith("rate") for name in recording.NAMES]
+    features, _ = recording.simulated(kin.world, FLIGHT, np.array([3.0, 10.65]), seed=1, stream=0)
+    assert np.nanmax(np.abs(features[rates])) <= 0.93 * 34.9 + 1e-9
+
+
+# ---- bank
+
+
+def test_a_bank_depends_on_its_seed_alone_not_on_threads(kin: Family) -> None:
+    one, two = (bank.make(kin, FLIGHT, 10, 4, seed=5, threads=threads) for threads in (1, 2))
+    assert np.array_equal(one.features, two.features, equal_nan=True)
+    assert (one.landed == two.landed).all()
+    assert (one.theta == two.theta).all()
+    other = bank.make(kin, FLIGHT, 10, 4, seed=6, threads=2)
+    assert (one.z != other.z).all()
+
+
+def test_later_members_fly_near_landings_of_earlier_ones(kin: Family) -> None:
+    made = bank.make(kin, FLIGHT, 60, 16, seed=7)
+    assert made.landed[15:].mean() > 1.5 * made.landed[:15].mean()
+    assert (made.theta >= BOUNDS[:, 0]).all()
+    assert (made.theta <= BOUNDS[:, 1]).all()
+
+
+def test_a_bank_is_flown_once_and_its_name_says_what_it_depends_on(
+    kin: Family, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    flown: list[int] = []
+    first = Simulator.of(kin, FLIGHT, n_members=24, progress=lambda done, _: flown.append(done))
+    assert flown == list(range(1, 25))
+    second = Simulator.of(kin, FLIGHT, n_members=24, progress=lambda done, _: flown.append(done))
+    assert len(flown) == 24
+    assert (first.recordings.weights == second.recordings.weights).all()
+    wider = family.of(kin.world, CHOICE.model_copy(update={"scale": 2.0}))
+    Simulator.of(wider, FLIGHT, n_members=24)
+    Simulator.of(kin, Flight(2.6, 90.0, "constant", "imparted", BOUNDS), n_members=24)
+    assert len(list((tmp_path / "ivl").iterdir())) == 3
+
+
+# ---- emulators
+
+
+def test_the_emulators_predict_members_that_they_have_not_seen(kin: Family, simulator: Simulator) -> None:
+    fresh = bank.make(kin, FLIGHT, 24, 12, seed=99)
+    n = fresh.landed.size
+    flights = np.repeat(fresh.z, 12, axis=0), fresh.theta.reshape(n, -1), np.full(n, np.nan)
+    seen = emulator.used(fresh.features).reshape(n, -1)
+    error = seen - simulator.recordings.mean(*flights)
+    pitch = emulator.USED.index("pitch_090")
+    assert np.nanstd(error[:, pitch]) < 0.25 * np.nanstd(seen[:, pitch])
+    expected = np.sqrt(simulator.recordings.within[pitch, pitch] + simulator.recordings.between[pitch, pitch])
+    assert 0.5 < np.nanstd(error[:, pitch]) / expected < 2.0
+    p, y = simulator.landings.rate(*flights), fresh.landed.ravel()
+    assert p[y].mean() > p[~y].mean() + 0.25
+    assert abs(p.mean() - y.mean()) < 0.06
+
+
+def test_covariances_are_found_from_residuals_with_gaps() -> None:
+    rng = np.random.default_rng(1)
+    within, between = np.diag([1.0, 4.0, 0.25]), np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.5]])
+    b = rng.multivariate_normal(np.zeros(3), between, 4000)
+    residual = b[:, None] + rng.multivariate_normal(np.zeros(3), within, (4000, 6))
+    residual[:, :2, 2] = np.nan  # a gap
+    found_within, found_between = emulator._covariances(residual)
+    assert np.allclose(found_within, within, atol=0.15)
+    assert np.allclose(found_between, between, atol=0.2)
+
+
+# ---- posterior
+
+
+def linear(kin: Family, rng: np.random.Generator) -> emulator.RecordingEmulator:
+    """Features that are linear in z, with known noise, whatever is flown."""
+    scale = emulator.Scale(BOUNDS[:, 0], BOUNDS[:, 1], 0.0, 1.0)
+    n_terms = emulator._terms(np.zeros((1, len(kin.dimensions))), np.zeros((1, 3))).shape[1]
+    weights = np.zeros((n_terms, N_USED))
+    weights[1 : 1 + len(kin.dimensions)] = rng.normal(size=(len(kin.dimensions), N_USED))
+    return emulator.RecordingEmulator(scale, weights, 4.0 * np.eye(N_USED), 0.5 * np.eye(N_USED))
+
+
+def evidence_of(emulated: emulator.RecordingEmulator, z: np.ndarray, n: int, rng: np.random.Generator) -> Evidence:
+    """Recordings of a member of a linear family, with errors as the emulator says; half of them with a gap."""
+    theta = rng.uniform(BOUNDS[:, 0], BOUNDS[:, 1], (n, 2))
+    mean = emulated.mean(np.tile(z, (n, 1)), theta, np.full(n, np.nan))
+    shared = rng.multivariate_normal(np.zeros(N_USED), emulated.between)
+    features = mean + shared + rng.multivariate_normal(np.zeros(N_USED), emulated.within, n)
+    features[::2, -3:] = np.nan
+    return Evidence(theta, features, rng.random(n) < 0.5, np.full(n, np.nan))
+
+
+def exact(emulated: emulator.RecordingEmulator, evidence: Evidence, n_z: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and covariance of the Gaussian posterior of a linear family, all flights as one long vector."""
+    n = len(evidence.theta)
+    design = np.tile(emulated.weights[1 : 1 + n_z].T, (n, 1))
+    noise = np.kron(np.eye(n), emulated.within) + np.kron(np.ones((n, n)), emulated.between)
+    seen = np.isfinite(evidence.features).ravel()
+    a, y, s = design[seen], evidence.features.ravel()[seen], noise[np.ix_(seen, seen)]
+    covariance = np.linalg.inv(np.eye(n_z) + a.T @ np.linalg.solve(s, a))
+    return covariance @ a.T @ np.linalg.solve(s, y), covariance
+
+
+def test_the_posterior_of_a_linear_family_is_the_known_one(kin: Family) -> None:
+    rng = np.random.default_rng(3)
+    emulated, n_z = linear(kin, rng), len(kin.dimensions)
+    believed = belief_of(emulated, kin, n=3000, nu=1e9, n_full=1e9, discrepancy=0.0)
+    believed._landings = Even(emulated, np.zeros(N_USED), np.ones(N_USED), [])
+    whole = evidence_of(emulated, np.array([0.8, -1.1, 0.4]), 5, rng)
+    for n in (2, 5):  # flight by flight, as it is used
+        part = Evidence(whole.theta[:n], whole.features[:n], whole.landed[:n], whole.battery_V[:n])
+        believed.update(part)
+    mean, covariance = exact(emulated, whole, n_z)
+    assert np.allclose(believed.z.mean(axis=0), mean, atol=0.12)
+    assert np.allclose(np.cov(believed.z.T), covariance, atol=0.1)
+
+
+def test_ranks_of_the_true_member_are_uniform(kin: Family) -> None:
+    """Simulation-based calibration (Talts et al. 2018): a belief that is too sure, or not sure enough, shows here."""
+    rng = np.random.default_rng(4)
+    emulated, n_z = linear(kin, rng), len(kin.dimensions)
+    ranks = []
+    for number in range(60):
+        z = rng.standard_normal(n_z)
+        believed = belief_of(emulated, kin, seed=number, n=99, nu=1e9, n_full=1e9, discrepancy=0.0)
+        believed._landings = Even(emulated, np.zeros(N_USED), np.ones(N_USED), [])
+        believed.update(evidence_of(emulated, z, 2, rng))
+        ranks.extend(((believed.z < z).sum(axis=0) / 99).tolist())
+    counts, _ = np.histogram(ranks, bins=6, range=(0.0, 1.0))
+    expected = len(ranks) / 6
+    assert ((counts - expected) ** 2 / expected).sum() < 20.5  # chi-square, 5 degrees of freedom: p = 0.001
+
+
+def test_errors_that_all_flights_share_do_not_add_up_to_certainty(kin: Family) -> None:
+    rng = np.random.default_rng(5)
+    emulated = linear(kin, rng)
+    few, many = (evidence_of(emulated, np.zeros(3), n, np.random.default_rng(6)) for n in (2, 40))
+    spread = []
+    for evidence in (few, many):
+        believed = belief_of(emulated, kin, n=500, nu=1e9, n_full=1e9, discrepancy=0.0)
+        believed._landings = Even(emulated, np.zeros(N_USED), np.ones(N_USED), [])
+        believed.update(evidence)
+        spread.append(believed.z.std(axis=0).mean())
+    shared_alone = np.sqrt(np.diag(exact(
+        emulator.RecordingEmulator(emulated.scale, emulated.weights, 1e-6 * np.eye(N_USED), emulated.between), few, 3
+    )[1])).mean()  # fmt: skip
+    assert spread[1] > 0.8 * shared_alone
+    assert spread[1] < spread[0]
+
+
+def test_landings_tell_of_the_member(simulator: Simulator) -> None:
+    """Flights that land where few members do pull the belief towards those."""
+    rng = np.random.Generator(np.random.PCG64(7))
+    believed = simulator.belief(rng, 300, Trust())
+    before = believed.rates(np.array([[4.5, 9.0]])).mean()
+    n = 6
+    nothing = np.full((n, N_USED), np.nan)
+    theta = np.tile([4.5, 9.0], (n, 1))
+    for landed in (True, False):
+        told = simulator.belief(np.random.Generator(np.random.PCG64(7)), 300, Trust())
+        told.update(Evidence(theta, nothing, np.full(n, landed), np.full(n, np.nan)))
+        after = told.rates(np.array([[4.5, 9.0]])).mean()
+        assert after > before if landed else after < before
+
+
+def test_the_discrepancy_is_a_covariance_of_the_stated_size() -> None:
+    d = posterior.discrepancy(1.0)
+    assert np.linalg.eigvalsh(d).min() > 0
+    name = emulator.USED.index("pitch_210")
+    assert np.sqrt(d[name, name]) == pytest.approx(4.0 * (0.21 / 0.2) ** 2)
+    assert np.allclose(posterior.discrepancy(3.0), 9.0 * d)
+
+
+# ---- decision
+
+
+def test_a_late_trigger_is_a_larger_threshold() -> None:
+    moved = decide.perturbed(np.array([4.0, 8.0]), 0.01, 0.1, BOUNDS)
+    assert moved == pytest.approx([1.0 / (0.25 - 0.01), 8.8])
+    assert decide.perturbed(np.array([6.9, 10.0]), 0.05, 0.1, BOUNDS) == pytest.approx([7.0, 10.65])  # kept in the box
+
+
+def test_the_margin_is_an_average_over_the_box_of_errors() -> None:
+    points, weights = decide.around(np.array([[4.0, 8.0]]), BOUNDS)
+    assert weights.sum() == pytest.approx(1.0)
+    late = 0.25 - 1.0 / points[:, 0, 0]
+    share = points[:, 0, 1] / 8.0 - 1.0
+    assert weights @ late == pytest.approx(0.0, abs=1e-12)
+    assert weights @ late**2 == pytest.approx(0.01**2 / 3)  # as of a uniform distribution
+    assert weights @ share**2 == pytest.approx(0.1**2 / 3)
+
+
+class Window:
+    """A belief of one landing window: lands between two thresholds, better with a larger moment up to 8 N mm."""
+
+    def rates(self, theta: np.ndarray) -> np.ndarray:
+        r, m = theta[:, 0], theta[:, 1]
+        inside = expit((r - 3.8) * 40) * expit((4.4 - r) * 40)
+        return (inside * np.where(m < 8.0, m / 8.0, 1.0))[None]
+
+    def rate_of_one(self, theta: np.ndarray) -> np.ndarray:
+        return self.rates(theta)[0]
+
+
+NOTHING = correction.fit(np.empty((0, 2)), np.empty(0, dtype=bool), np.empty(0), np.array([0.3, 0.3]), 1.0)
+
+
+def test_the_safest_policy_lies_inside_the_window() -> None:
+    choice, rate = decide.safest(Window(), NOTHING, BOUNDS, np.random.default_rng(1))  # type: ignore[arg-type]
+    assert 4.0 < choice[0] < 4.25
+    assert choice[1] > 8.0
+    assert rate > 0.9
+
+
+def test_ephe_on_imagined_rollouts_converges_into_the_window() -> None:
+    mu, sigma = np.array([5.0, 5.0]), np.array([1.5, 1.5])
+    rng = np.random.default_rng(2)
+    for _ in range(4):
+        mu, sigma = decide.ephe(Window(), NOTHING, mu, sigma, BOUNDS, rng, 300, 10, 0.7, np.array([0.05, 0.05]))  # type: ignore[arg-type]
+    assert 3.9 < mu[0] < 4.3
+    assert mu[1] > 7.0
+    assert sigma[0] < 0.4
+
+
+# ---- correction
+
+
+def test_without_flights_the_correction_changes_nothing() -> None:
+    theta, rate = np.array([[4.0, 8.0], [5.0, 2.0]]), np.array([0.3, 0.9])
+    assert (NOTHING(theta, rate) == rate).all()
+
+
+def test_the_correction_is_the_mode_of_its_posterior() -> None:
+    rng = np.random.default_rng(1)
+    theta, landed = rng.uniform(0, 1, (12, 2)), rng.random(12) < 0.5
+    rate, lengths, size = rng.uniform(0.1, 0.9, 12), np.array([0.3, 0.5]), 1.5
+    kernel = correction._kernel(theta, theta, lengths, size)
+    precision = np.linalg.inv(kernel + 1e-10 * np.eye(12))
+
+    def cost(g: np.ndarray) -> float:
+        p = expit(logit(rate) + g)
+        return float(0.5 * g @ precision @ g - np.where(landed, np.log(p), np.log(1 - p)).sum())
+
+    mode = minimize(cost, np.zeros(12), method="BFGS", options={"gtol": 1e-8}).x
+    found = correction.fit(theta, landed, rate, lengths, size)
+    assert np.allclose(kernel @ found.weights, mode, atol=1e-3)
+
+
+def test_failures_where_landings_were_expected_sink_the_rate_there_alone() -> None:
+    theta = np.tile([4.0, 8.0], (6, 1))
+    found = correction.fit(theta, np.zeros(6, dtype=bool), np.full(6, 0.9), np.array([0.3, 0.3]), 3.0)
+    near, far = found(np.array([[4.0, 8.0], [6.0, 3.0]]), np.array([0.9, 0.9]))
+    assert near < 0.4
+    assert far == pytest.approx(0.9, abs=1e-6)
+
+
+# ---- learner
+
+
+def learner_of(simulator: Simulator | None, seed: int = 1, **options: Any) -> EpheBelief:
+    learner = make_learner("ephe_belief", [4.0, 5.0], [1.5, 1.5], bounds=BOUNDS, n_rollouts=2, seed=seed, **options)
+    assert isinstance(learner, EpheBelief)
+    if simulator is not None:
+        learner.begin(simulator)
+    return learner
+
+
+def fly(learner: EpheBelief, world: World, n: int, seed: int, first: int = 0) -> list[bool]:
+    """Fly and tell n episodes of two flights; whether each flight landed."""
+    landings = []
+    for episode in range(first, first + n):
+        theta = learner.ask()
+        flown = [recording.simulated(world, FLIGHT, t, seed, 2 * episode + k) for k, t in enumerate(theta)]
+        landed = np.array([bool(four_leg(outcome).all()) for _, outcome in flown])
+        features = np.array([features for features, _ in flown])
+        learner.tell(theta, np.where(landed, 100.0, 10.0), {LANDED: landed, RECORDING: features})
+        landings.extend(landed.tolist())
+    return landings
+
+
+def test_it_lands_vehicles_that_it_never_saw_from_the_first_flights_on(kin: Family, simulator: Simulator) -> None:
+    rng = np.random.Generator(np.random.PCG64(123))
+    landed, rates = [], []
+    for number in range(6):
+        _, drone = kin.draw(rng)
+        learner = learner_of(simulator, seed=number)
+        landed.append(fly(learner, drone, 4, seed=number))
+        recommended = learner.result.recommended
+        rates.append(four_leg(drone.rollouts(2.5, 90.0, np.full(60, recommended[0]), recommended[1])).mean())
+    assert np.mean(landed) > 0.5
+    assert np.mean(rates) > 0.75
+
+
+def test_the_state_continues_bit_for_bit(kin: Family, simulator: Simulator) -> None:
+    one = learner_of(simulator)
+    fly(one, kin.world, 2, seed=5)
+    text = json.dumps(one.state_dict(), allow_nan=False)
+    two = learner_of(simulator, seed=9)
+    two.load_state_dict(json.loads(text))
+    assert (fly(one, kin.world, 2, seed=5, first=2)) == fly(two, kin.world, 2, seed=5, first=2)
+    assert json.dumps(one.state_dict()) == json.dumps(two.state_dict())
+    assert (one.ask() == two.ask()).all()
+
+
+def test_an_alarm_comes_when_nothing_lands_that_was_expected_to(simulator: Simulator) -> None:
+    learner = learner_of(simulator)
+    assert learner.model_fits
+    for _ in range(8):
+        theta = learner.ask()
+        learner.tell(theta, np.full(2, 10.0), {LANDED: np.zeros(2, dtype=bool)})
+    assert not learner.model_fits
+    flown = learner._theta
+    assert np.ptp(flown[:, 0]) > 0.3  # it has gone elsewhere
+
+
+def test_without_a_simulator_it_is_ephe_with_a_memory() -> None:
+    rng = np.random.default_rng(1)
+    one = learner_of(None)
+    two = make_learner("ephe_memory", [4.0, 5.0], [1.5, 1.5], bounds=BOUNDS, n_rollouts=2, seed=1)
+    for _ in range(4):
+        a, b = one.ask(), two.ask()
+        assert (a == b).all()
+        rewards = rng.uniform(0, 100, 2)
+        one.tell(a, rewards)
+        two.tell(b, rewards)
+    assert one.model_fits is None
+
+
+# ---- a whole run
+
+
+@pytest.fixture
+def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> experiment.Experiment:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("ivl.belief.simulator.MEMBERS", 40)
+    settings = ["n_rollouts=4", "budget=16", "check.effort=0.02", "check.n_fresh=20", "start=imparted"]
+    return experiment.load("experiments/paper_flight.yaml", settings, learner="ephe_belief")
+
+
+def test_a_run_keeps_recordings_and_continues_with_the_same_bits(small: experiment.Experiment, tmp_path: Path) -> None:
+    whole = run.run(small, tmp_path / "whole")
+    assert whole.rollouts.recordings is not None
+    assert whole.rollouts.recordings.shape == (16, recording.N)
+    assert np.isfinite(whole.rollouts.recordings).any(axis=1).mean() > 0.5
+
+    class Cut(RuntimeError):
+        """The run is cut off."""
+
+    def cut(progress: Any) -> None:
+        if progress.episode == 2:
+            raise Cut
+
+    with pytest.raises(Cut):
+        run.run(small, tmp_path / "cut", hooks=run.Hooks(on_episode=cut))
+    resumed = run.run(small, tmp_path / "cut", resume=True)
+    assert (resumed.rollouts.theta == whole.rollouts.theta).all()
+    assert resumed.history == whole.history
+
+
+def test_a_run_says_why_it_learns_without_simulated_vehicles(small: experiment.Experiment, tmp_path: Path) -> None:
+    bare = small.model_copy(update={"vehicle": "habas2021", "gear_set": "as_simulated"})
+    assert "no parameter has a sigma" in " ".join(run.run(bare, tmp_path / "bare").summary["warnings"])
