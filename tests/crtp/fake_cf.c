@@ -108,6 +108,11 @@ void ivl_cf_set_address(ivl_cf_t *cf, uint8_t address)
     (void)say("address %02x", address);
 }
 
+void ivl_cf_skip(ivl_cf_t *cf, uint64_t us)
+{
+    (void)cf, (void)us;
+}
+
 bool ivl_cf_is_deck(const char *name)
 {
     return strcmp(name, "bcFlow2") == 0;
