@@ -85,7 +85,8 @@ typedef enum
     IVL_CF_LOG_F32 = 7
 } ivl_cf_log_type_t;
 
-/// The value lies at `address` in the machine's own byte order.  A write copies the bytes there, then calls `changed`, if there is one.
+/// The value lies at `address` in the machine's own byte order.  A write copies the bytes there, then calls `changed`, if there is one.  The
+/// vehicle may change a value by itself.
 /// The default of a parameter is its value after ivl_cf_open.
 typedef struct
 {
@@ -114,9 +115,6 @@ const ivl_cf_log_t   *ivl_cf_logs(const ivl_cf_t *cf, size_t *n);
 
 /// Bring the values behind the log table up to date; before log variables are sampled.
 void ivl_cf_logs_refresh(ivl_cf_t *cf);
-
-/// Parameters that the vehicle itself has changed since the last call, one a call.  @return false if there are no more
-bool ivl_cf_param_take_changed(ivl_cf_t *cf, size_t *index);
 
 // ---- memories
 

@@ -163,8 +163,6 @@ struct ivl_cf
     uint32_t            tester_errors;  ///< bytes written to the memory tester that were not those it expects
     ivl_cf_text_t       text;
     ivl_cf_packets_t    to_app, from_app;
-    size_t              changed[IVL_CF_CHANGED_MAX];
-    size_t              n_changed;
 };
 
 /// The vehicle of this process.
@@ -262,9 +260,6 @@ bool ivl_cf_tables_open(ivl_cf_t *cf);
 
 /// Held parameters have their first values.
 void ivl_cf_tables_boot(ivl_cf_t *cf);
-
-/// The vehicle has changed a parameter of its own.
-void ivl_cf_param_changed(ivl_cf_t *cf, const void *address);
 
 // ---- cf_sdk.c
 

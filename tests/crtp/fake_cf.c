@@ -35,7 +35,6 @@ void fake_clear(void)
 void fake_reset(void)
 {
     memset(&fake, 0, sizeof fake);
-    fake.changed = -1;
     fake_values = (fake_values_t){
         .u8 = 2,
         .i16 = -3,
@@ -167,15 +166,6 @@ void ivl_cf_logs_refresh(ivl_cf_t *cf)
 {
     (void)cf;
     fake.n_refreshed++;
-}
-
-bool ivl_cf_param_take_changed(ivl_cf_t *cf, size_t *index)
-{
-    (void)cf;
-    const bool any = fake.changed >= 0;
-    *index = any ? (size_t)fake.changed : 0u;
-    fake.changed = -1;
-    return any;
 }
 
 // ---- memories: one that can be written, one that cannot
