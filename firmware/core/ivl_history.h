@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define IVL_HISTORY_TICKS 32u  ///< a power of two: 62 ms at 500 Hz
+#define IVL_HISTORY_TICKS 128u  ///< a power of two: 126 ms at 1 kHz, so that no delay that is allowed is forgotten
 
 /// Integrals of the acceleration since the start.
 typedef struct
