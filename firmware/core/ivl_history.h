@@ -16,9 +16,9 @@ typedef struct
 
 typedef struct
 {
-    ivl_motion_t at[IVL_HISTORY_TICKS];  ///< tick n in at[n modulo its size]
     uint32_t     n;                      ///< last tick, 0 at the start
     float        a_mps2;                 ///< of the last tick
+    ivl_motion_t at[IVL_HISTORY_TICKS];  ///< tick n in at[n modulo its size]; last, so that offsets of the others stay short
 } ivl_history_t;
 
 /// Both integrals are 0 now.
