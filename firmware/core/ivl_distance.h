@@ -20,8 +20,8 @@ typedef struct
 {
     bool          running;
     bool          measured;  ///< this tick has looked at a measurement
-    ivl_motion_t  motion;   ///< history's integrals at the instant of the estimate
-    float         since_s;  ///< from that instant to this tick
+    ivl_motion_t  motion;    ///< history's integrals at the instant of the estimate
+    float         since_s;   ///< from that instant to this tick
     ivl_filter_t  filter;
     ivl_formula_t formula;
     float         range_d_m;  ///< source RANGE: distance at the instant of the estimate

@@ -124,10 +124,10 @@ struct ivl_cf
     uint64_t            zero_us;  ///< vehicle time at which the world's clock was 0
     uint64_t            n_reset;
     bool                grounded;  ///< rests on the floor
-    ivl_cf_room_t      *room;  ///< with other vehicles; NULL: it is alone
+    ivl_cf_room_t      *room;      ///< with other vehicles; NULL: it is alone
     size_t              room_seat;
-    uint64_t            skipped_us;  ///< of the room's time
-    uint32_t            n_bumps;     ///< with other vehicles
+    uint64_t            skipped_us;                      ///< of the room's time
+    uint32_t            n_bumps;                         ///< with other vehicles
     uint64_t            apart_us[IVL_CF_ROOM_VEHICLES];  ///< of each of them: no bump before that, in the room's time
     bool                link_up;
     bool                runs_stock;  ///< the stock controller is selected
@@ -152,12 +152,12 @@ struct ivl_cf
     float               acc_g[3];    ///< filtered
     float               motor_N[4];  ///< commands of the last tick
     float               variance_m2;
-    bool                has_range;                         ///< the world has a ranging sensor
-    uint16_t            range_mm[IVL_CF_DIRECTIONS];       ///< last readings
-    bool                range_begun;                       ///< the multi-ranger measures from there
-    uint64_t            range_from_us;                     ///< in the room's time
+    bool                has_range;                    ///< the world has a ranging sensor
+    uint16_t            range_mm[IVL_CF_DIRECTIONS];  ///< last readings
+    bool                range_begun;                  ///< the multi-ranger measures from there
+    uint64_t            range_from_us;                ///< in the room's time
     ivl_sim_kin_t       range_from;
-    int16_t             flow_pixels[2];                    ///< deltaX, deltaY of the flow sensor
+    int16_t             flow_pixels[2];  ///< deltaX, deltaY of the flow sensor
     uint8_t             eeprom[IVL_CF_EEPROM_BYTES];
     uint8_t             one_wire[IVL_CF_DECKS][IVL_CF_ONE_WIRE_BYTES];  ///< of the decks that are on
     uint32_t            tester_errors;  ///< bytes written to the memory tester that were not those it expects

@@ -254,8 +254,9 @@ static void test_each_takes_half_of_the_closing_speed_and_what_bounces_back(void
     write_u8("sil", "reset", 1);
     run_ms(500);
     const double         x = read_log("simTruth", "x"), z = read_log("simTruth", "z");
-    const ivl_cf_place_t place = {.t_us = ivl_cf_time_us(vehicle), .is_there = true, .p_W_m = {x + 0.08, 0.0, z}, .v_W_mps = {-2.0, 0.0, 0.0}};
-    const double         before_mps = read_log("simTruth", "vx");
+    const ivl_cf_place_t place = {
+        .t_us = ivl_cf_time_us(vehicle), .is_there = true, .p_W_m = {x + 0.08, 0.0, z}, .v_W_mps = {-2.0, 0.0, 0.0}};
+    const double before_mps = read_log("simTruth", "vx");
     ivl_cf_room_tell(&room, OTHER, &place);
     run_ms(4);
     TEST_ASSERT_DOUBLE_WITHIN(0.05, before_mps - 0.5 * (1.0 + 0.3) * 2.0, read_log("simTruth", "vx"));

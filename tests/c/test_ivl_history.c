@@ -13,7 +13,7 @@ static const float TICK_HZ_MAX = 1000.0f;
 
 // of the members that are a delay of a reading, the largest value that is allowed
 #define MAX_OF_DELAYS(ctype, group, name, field, unit, min, max, dflt, doc) MAX_IF_DELAY(name, max)
-#define MAX_IF_DELAY(name, max)                                             (strcmp(name, "rrev_delay") == 0 || strcmp(name, "range_delay") == 0) ? (float)(max) : 0.0f,
+#define MAX_IF_DELAY(name, max) (strcmp(name, "rrev_delay") == 0 || strcmp(name, "range_delay") == 0) ? (float)(max) : 0.0f,
 
 static void test_integrals_of_a_constant_acceleration_are_exact_at_any_instant(void)
 {

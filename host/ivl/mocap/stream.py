@@ -176,9 +176,7 @@ class Mocap:
             in_flight = guard is not None and guard.in_flight()
             with self._lock:
                 n_jumps = self._watch.counts.n_jumps
-                believed = [
-                    (frame.t_s, pose) for frame in frames if (pose := self._take(frame, in_flight)) is not None
-                ]
+                believed = [(frame.t_s, pose) for frame in frames if (pose := self._take(frame, in_flight)) is not None]
                 self._failure = self._tracker.failure
                 now_s = time.monotonic()
                 state = self._state(now_s)

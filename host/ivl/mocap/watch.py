@@ -267,7 +267,11 @@ class Watch:
             run = None
         # what moves as the run does is the run's, though its own motion may by now have come that far, too
         is_its = run is not None and run.past.moves_to(t_s, pose, self._config)
-        if run is not None and (is_its or not (is_fresh and is_own)) and self._agree(run.pose, pose, t_s - run.t_last_s):
+        if (
+            run is not None
+            and (is_its or not (is_fresh and is_own))
+            and self._agree(run.pose, pose, t_s - run.t_last_s)
+        ):
             return self._settles(run, t_s, pose)
         if is_fresh and is_own:
             return True
