@@ -39,7 +39,7 @@ class Sink:
     def __init__(self) -> None:
         self.places: list[tuple[float, float, float]] = []
 
-    def send_extpose(self, x: float, y: float, z: float, *q_WB: float) -> None:
+    def send_extpose(self, x: float, y: float, z: float, *_: float) -> None:
         self.places.append((x, y, z))
 
 
