@@ -19,6 +19,8 @@ from ivl.can.repeat import LogMemory, Repeater
 from ivl.can.telemetry import Telemetry
 
 TICK_S = 0.01
+AGAIN_S = 0.0005
+"""A bus that is full is tried again after so long: a classic frame takes a fifth of that."""
 TELEMETRY_S = 0.05
 STOP_S = 10.0
 """A thread that reads a bus without a file ends within 0.1 s, on a busy machine later; it must not outlive the loop."""
@@ -63,6 +65,7 @@ class Gateway(ABC, asyncio.DatagramProtocol):
         self._link = CanLink(bus, options.node, self.at_host, options.fd)
         self._udp: asyncio.DatagramTransport | None = None
         self._failed: asyncio.Future[None] | None = None
+        self._is_pumping = False
 
     async def run(self) -> None:
         """Run until the task is cancelled.
@@ -126,12 +129,24 @@ class Gateway(ABC, asyncio.DatagramProtocol):
     async def _tick_forever(self) -> None:
         while True:
             await self._tick(time.monotonic())
+            self._try_again_soon()
             await asyncio.sleep(TICK_S)
 
     def _to_bus(self, packets: list[bytes], now_s: float) -> None:
         for packet in packets:
             self.n_packets_out += 1
             self._link.send(packet, now_s)
+        self._try_again_soon()
+
+    def _try_again_soon(self) -> None:
+        if self._link.is_waiting and not self._is_pumping:
+            self._is_pumping = True
+            asyncio.get_running_loop().call_later(AGAIN_S, self._pump)
+
+    def _pump(self) -> None:
+        self._is_pumping = False
+        self._link.pump(time.monotonic())
+        self._try_again_soon()
 
     def _own_state(self, now_s: float) -> State:
         return State.RUNNING if self._link.hears_peer(now_s) else State.PEER_LOST
@@ -270,7 +285,7 @@ class VehicleGateway(Gateway):
             if not self._has_vehicle:
                 self._udp.sendto(_SCAN)
             for frame in self._telemetry.frames(now_s):
-                self._link.put(frame, now_s)
+                self._link.show(frame, now_s)
 
 
 class _Frames(can.Listener):

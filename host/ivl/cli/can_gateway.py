@@ -28,6 +28,7 @@ Examples:
       the frames that people look at, for candump and SavvyCAN
 """
 _REPORT_S = 0.2
+_FULL_S = 5.0
 
 
 def can_gateway(
@@ -120,10 +121,17 @@ async def _serve(end: Any) -> None:
     running = asyncio.ensure_future(end.run())
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, running.cancel)
-    said = None
+    said, n_unsent, t_full_s = None, 0, float("-inf")
     while not running.done():
         await asyncio.wait({running}, timeout=_REPORT_S)
         report = end.report()
+        if report["n_unsent"] > n_unsent and loop.time() - t_full_s >= _FULL_S:
+            text = (
+                f"the bus is full: {report['n_unsent'] - n_unsent} frames were not sent; log less, or give the "
+                "interface a longer queue (SocketCAN: ip link set can0 txqueuelen 1000)"
+            )
+            n_unsent, t_full_s = report["n_unsent"], loop.time()
+            console.err.print(f"node {end.options.node}: {text}", highlight=False, soft_wrap=True)
         if report["up"] != said and not running.done():
             said = report["up"]
             text = "link up" if said else f"link down, other end: {report['peer']}"

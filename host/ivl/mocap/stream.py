@@ -172,22 +172,28 @@ class Mocap:
         assert self._tracker is not None
         while not self._ended.is_set():
             frames = self._tracker.poll(TICK_S)
+            guard = self.guard
+            in_flight = guard is not None and guard.in_flight()
             with self._lock:
-                believed = [(frame.t_s, pose) for frame in frames if (pose := self._take(frame)) is not None]
+                n_jumps = self._watch.counts.n_jumps
+                believed = [(frame.t_s, pose) for frame in frames if (pose := self._take(frame, in_flight)) is not None]
                 self._failure = self._tracker.failure
                 now_s = time.monotonic()
                 state = self._state(now_s)
+                # also one that was over before anybody looked
+                status = Status.JUMPED if self._watch.counts.n_jumps > n_jumps else state.status
+                text = self._text(status, now_s)
             for t_s, pose in believed:
                 self._send(t_s, pose)
-            if self.guard is not None:
-                self.guard.look(state.status, f"motion capture: {state.text}", now_s)
+            if guard is not None:
+                guard.look(status, f"motion capture: {text}", now_s)
             self._restart_if_silent(now_s, bool(frames))
 
-    def _take(self, frame: Frame) -> Pose | None:
+    def _take(self, frame: Frame, in_flight: bool) -> Pose | None:
         self._bodies = tuple(frame.bodies)
         values = frame.bodies.get(self.config.body)
         pose = None if values is None else make_pose(values, self.config.up)
-        return self._watch.take(frame.t_s, pose, is_present=values is not None)
+        return self._watch.take(frame.t_s, pose, is_present=values is not None, in_flight=in_flight)
 
     def _send(self, t_s: float, pose: Pose) -> None:
         period_s = 1.0 / self.config.send_hz
