@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ivl import native, yamlfile
+from ivl import native, references, yamlfile
 from ivl.errors import ConfigError
 
 VEHICLES_DIR = Path(__file__).parent / "vehicles"
@@ -196,7 +196,7 @@ def _load_sensors(
             )
     given: dict[str, Quantity | _Reference] = {}
     for name in header.includes:
-        given |= _load_sensors(name, table, (*including, path))[2]
+        given |= _load_sensors(references.absolute(name, path.parent), table, (*including, path))[2]
     references = _references(groups, path.name, table)
     numbers = {
         group: {key: raw for key, raw in members.items() if f"{group}.{key}" not in references}
@@ -305,7 +305,7 @@ def unit(name: str) -> str:
 
 def _locate(name_or_path: str, folder: Path, kind: str) -> Path:
     """A path is taken as given; a bare name is looked up in the package."""
-    if name_or_path.endswith((".yaml", ".yml")) or "/" in name_or_path:
+    if references.is_path(name_or_path):
         path = Path(name_or_path)
         if not path.is_file():
             raise ConfigError(f"{name_or_path}: no such {kind} file")

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn
 
-from ivl import run
+from ivl import references, run
 from ivl.cli import console, policy_options
 from ivl.policy import use
 
@@ -97,7 +97,7 @@ def sweep(
     learned = policy_options.load(policy_file)
     change = use.as_it_is(learned, learner) if learned is not None else None
     grid = config.load_sweep(path, settings or [], vary or [], change, learner=learner)
-    base = f"{grid.name}-{grid.gear_set}-{'-'.join(grid.learner_names())}"
+    base = f"{grid.name}-{references.title(grid.gear_set)}-{'-'.join(grid.learner_names())}"
     return _run(grid, base, "ivl sweep", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 
 
@@ -117,7 +117,7 @@ def map_(
     from ivl.sweep import config
 
     grid = config.load_map(path, settings or [], vary or [])
-    base = f"{grid.name}-{grid.gear_set}"
+    base = f"{grid.name}-{references.title(grid.gear_set)}"
     return _run(grid, base, "ivl map", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 
 

@@ -13,17 +13,18 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import distributed
 
-from ivl import native
+from ivl import native, references
 from ivl.errors import NativeError, RolloutError
 from ivl.sweep import cluster, folder, plan, schema, store
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.plan import DaskTask
+from ivl.sweep.vary import Varied, world_name
 from ivl.sweep.work import lost, record, run_packed
 from ivl.world import World
 
@@ -108,16 +109,31 @@ def run(
     """
     cluster.check(scheduler, workers)
     worlds = grid.worlds()
+    packed, copies = references.pack(grid)
     size = task_size or plan.good_size(grid, workers or cluster.processors())
-    with closing(folder.open_run(run_folder, grid, worlds, size, resume)) as opened:
-        tasks = plan.plan(grid, opened.task_size)
+    with closing(folder.open_run(run_folder, packed, copies, _renamed(grid, worlds), size, resume)) as opened:
+        tasks = [replace(task, varied=_identities(task.varied)) for task in plan.plan(grid, opened.task_size)]
         done = store.finished_tasks(run_folder)
-        session = _Session(run_folder, grid, worlds, tasks, done, on_standing)
+        session = _Session(run_folder, packed, _renamed(grid, worlds), tasks, done, on_standing)
         session.tell()
         if session.waiting:
             with cluster.open_client(scheduler, workers) as client:
                 session.fly(client)
         return session.result()
+
+
+def _identities(varied: Varied) -> Varied:
+    """The values of a variant, files by what stands for them in a run."""
+    return tuple((path, references.identity(value) if path in references.FIELDS else value) for path, value in varied)
+
+
+def _renamed(grid: Sweep | PolicyMap, worlds: dict[str, World]) -> dict[str, World]:
+    """The worlds by names in which files are called by what stands for them in a run."""
+    found = {}
+    for varied in grid.variants():
+        for gear in grid.at(varied).gear_names():
+            found[world_name(gear, _identities(varied))] = worlds[world_name(gear, varied)]
+    return found
 
 
 class _Session:

@@ -3,6 +3,8 @@
 A worker needs this package and the native library, and nothing of the client's files: the world comes with the task.
 """
 
+import hashlib
+import json
 import os
 import pickle
 import platform
@@ -19,6 +21,7 @@ from ivl.errors import NativeError
 from ivl.sweep import policymap, schema, tables, trials
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.plan import DaskTask
+from ivl.sweep.store import INDEX_KEY
 from ivl.sweep.trials import Trial
 from ivl.sweep.vary import as_cell
 from ivl.world import World
@@ -91,7 +94,7 @@ def lost(grid: Sweep | PolicyMap, task: DaskTask, error: Exception) -> Done:
 
 
 def record(task: DaskTask, done: Done) -> bytes:
-    """The row of the `tasks` table, as a Parquet file."""
+    """The row of the `tasks` table, as a Parquet file that vouches for the task's other parts."""
     columns = {
         "task": [task.number],
         "n_trials": [done.n_trials],
@@ -102,7 +105,11 @@ def record(task: DaskTask, done: Done) -> bytes:
         "result_bytes": [sum(len(part) for part in done.parts.values())],
         "worker": [done.worker],
     }
-    return tables.encode(tables.make_table(schema.TASKS, columns))
+    table = tables.make_table(schema.TASKS, columns)
+    index = {kind: hashlib.sha256(part).hexdigest() for kind, part in done.parts.items()}
+    return tables.encode(
+        table.replace_schema_metadata({**table.schema.metadata, INDEX_KEY: json.dumps(index, sort_keys=True).encode()})
+    )
 
 
 def _with_varied(table: pa.Table, task: DaskTask) -> pa.Table:
