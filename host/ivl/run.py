@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import ivl
-from ivl import assess, experiment, files, links, native, references, yamlfile
+from ivl import assess, experiment, files, links, native, numerics, references, yamlfile
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
@@ -206,6 +206,7 @@ def make_manifest(
         "git_commit": git_commit(),
         "python": platform.python_version(),
         "numpy": np.__version__,
+        "numerics": numerics.kernel(),
         "platform": platform.platform(),
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "units": {f"out_{name}": field.unit for name, field in library.outcome_fields.items()},
@@ -229,6 +230,11 @@ def _open(
     for key in _MUST_MATCH:
         if old.get(key) != manifest[key]:
             raise StoreError(f"{folder}: cannot be resumed: {_difference(folder, key, old, manifest, chosen)}")
+    if old.get("numerics", manifest["numerics"]) != manifest["numerics"]:
+        raise StoreError(
+            f"{folder}: cannot be resumed: it was computed by {old['numerics']}, here is {manifest['numerics']}, so "
+            f"its search would not continue bit for bit ({numerics.ADVICE})"
+        )
     store = RunStore.open_existing(folder, dtype)
     if store.layout != layout:
         store.close()

@@ -66,9 +66,7 @@ class RunStore:
 
     layout: Layout
 
-    def __init__(
-        self, folder: Path, outcome_dtype: np.dtype[np.void], db: sqlite3.Connection, held: ExitStack
-    ) -> None:
+    def __init__(self, folder: Path, outcome_dtype: np.dtype[np.void], db: sqlite3.Connection, held: ExitStack) -> None:
         """Use `create`, `open_existing` or `open_reading`; `held` is what to give back at the end."""
         self.folder = folder
         self._outcome_dtype = outcome_dtype

@@ -127,6 +127,6 @@ async def _serve(end: Any) -> None:
         if report["up"] != said and not running.done():
             said = report["up"]
             text = "link up" if said else f"link down, other end: {report['peer']}"
-            console.err.print(f"node {end.options.node}: {text}", highlight=False, soft_wrap=True)
+            console.err.print(f"node {end.options.node}: {text}")
     if not running.cancelled():
         running.result()

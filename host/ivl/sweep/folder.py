@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import ivl
-from ivl import files, native, references, yamlfile
+from ivl import files, native, numerics, references, yamlfile
 from ivl.errors import ConfigError, StoreError
 from ivl.layout import EMPTY, layout_of
 from ivl.run import git_commit
@@ -43,10 +43,10 @@ class OpenRun:
 def open_run(
     run: Path,
     grid: Sweep | PolicyMap,
-    copies: Mapping[str, bytes],
     worlds: Mapping[str, World],
     task_size: int,
     resume: bool,
+    copies: Mapping[str, bytes] | None = None,
 ) -> OpenRun:
     """Begin a run, or continue one; grid and copies are those of `ivl.references.pack`.
 
@@ -67,7 +67,7 @@ def open_run(
             store.clear_unfinished(run)
         else:
             _check_empty(run)
-            references.save(copies, run)
+            references.save(copies or {}, run)
             files.write(run / f"{_kind(grid)}.yaml", grid.to_yaml())
             write_json(run / "manifest.json", manifest)
         return OpenRun(int(store.read_manifest(run)["task_size"]), lock)
@@ -99,6 +99,7 @@ def make_manifest(grid: Sweep | PolicyMap, worlds: Mapping[str, World], task_siz
         "git_commit": git_commit(),
         "python": platform.python_version(),
         "packages": {name: version(name) for name in _PACKAGES},
+        "numerics": numerics.kernel(),
         "platform": platform.platform(),
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "units": {kind: schema.units(kind, layout) for kind in kinds},
@@ -126,7 +127,9 @@ def _resolved(kind: str, data: dict[str, Any]) -> dict[str, Any]:
 def _check_empty(run: Path) -> None:
     if (run / "manifest.json").exists():
         raise StoreError(f"{run}: holds a run already: continue it with --resume, or choose another --out")
-    foreign = sorted(path.name for path in run.iterdir() if path.name not in _LEFT_BY_A_CREATION and not files.is_leftover(path.name))
+    foreign = sorted(
+        path.name for path in run.iterdir() if path.name not in _LEFT_BY_A_CREATION and not files.is_leftover(path.name)
+    )
     if foreign:
         raise StoreError(f"{run}: is not empty ({foreign[0]} ...) and holds no run: choose another --out")
 
@@ -145,3 +148,8 @@ def _check_same(run: Path, new: Mapping[str, Any]) -> None:
             raise StoreError(
                 f"{run}: cannot be resumed: the {what} changed since it began, so its tables would mix two models"
             )
+    if old.get("numerics", new["numerics"]) != new["numerics"]:
+        raise StoreError(
+            f"{run}: cannot be resumed: it was computed by {old['numerics']}, here is {new['numerics']} "
+            f"({numerics.ADVICE})"
+        )
