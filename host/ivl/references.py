@@ -32,8 +32,10 @@ def is_path(text: str) -> bool:
 
 
 def absolute(value: Any, base: Path) -> Any:
-    """A path relative to `base` as an absolute one; anything else as it is."""
-    return os.path.abspath(base / value) if isinstance(value, str) and is_path(value) else value
+    """A path relative to `base` as an absolute one, links kept as they are; anything else as it is."""
+    if not isinstance(value, str) or not is_path(value):
+        return value
+    return os.path.normpath(base.absolute() / value)
 
 
 def resolve(data: dict[str, Any], base: Path) -> None:
@@ -42,9 +44,11 @@ def resolve(data: dict[str, Any], base: Path) -> None:
         if name in data:
             data[name] = absolute(data[name], base)
     vary, tasks = data.get("vary"), data.get("tasks")
-    for name, values in vary.items() if isinstance(vary, dict) else ():
-        if name in FIELDS and isinstance(values, list):
-            vary[name] = [absolute(value, base) for value in values]
+    if isinstance(vary, dict):
+        data["vary"] = {
+            name: [absolute(value, base) for value in values] if name in FIELDS and isinstance(values, list) else values
+            for name, values in vary.items()
+        }
     for task in tasks if isinstance(tasks, list) else ():
         if isinstance(task, dict):
             resolve(task, base)

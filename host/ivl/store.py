@@ -363,7 +363,7 @@ def _connect(folder: Path, path: Path, options: str) -> sqlite3.Connection:
 
 
 def _snapshot(folder: Path, held: ExitStack) -> tuple[Path, str]:
-    """What to read: the database itself if all is in it, else a copy of it and of the log that a writer goes on with."""
+    """What to read: the database itself if all is in it, else a copy of it and of the writer's log."""
     names = ("run.sqlite", "run.sqlite-wal")
     log = folder / names[1]
     if not log.exists() or log.stat().st_size == 0:

@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, TypeVar, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -60,8 +60,8 @@ _PLAIN = (
 class _Loader(yaml.SafeLoader):
     """The core schema of YAML 1.2 with merge keys, within limits."""
 
-    yaml_implicit_resolvers: dict[Any, Any] = {}  # noqa: RUF012 - PyYAML's own interface
-    yaml_constructors: dict[Any, Any] = {}  # noqa: RUF012
+    yaml_implicit_resolvers: ClassVar[dict[Any, Any]] = {}
+    yaml_constructors: ClassVar[dict[Any, Any]] = {}
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -70,7 +70,8 @@ class _Loader(yaml.SafeLoader):
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         """Compose a node unless the document becomes too deep or too large."""
-        event, self._depth = self.peek_event(), self._depth + 1
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        self._depth += 1
         if self._depth > DEPTH_MAX:
             raise _fault(event, f"nested deeper than {DEPTH_MAX}")
         node: Any = super().compose_node(parent, index)
@@ -99,7 +100,7 @@ class _Loader(yaml.SafeLoader):
         return node
 
     def compose_mapping_node(self, anchor: Any) -> Any:
-        """A mapping, whose keys are words, each given once. (Plain YAML keeps the last one silently.)"""
+        """A mapping, whose keys are words, each given once: plain YAML keeps the last one silently."""
         before, seen = self._n_nodes, set()
         node: Any = super().compose_mapping_node(anchor)
         for key, _ in node.value:
@@ -171,8 +172,10 @@ def _refuse_tag(loader: Any, node: Any) -> Any:  # noqa: ARG001 - PyYAML's own i
 for _name, _make in {"bool": _bool, "null": _null, "int": _int, "float": _float}.items():
     _Loader.add_constructor(f"{_TAG}{_name}", _make)
 for _name in ("str", "seq", "map"):
-    _Loader.add_constructor(f"{_TAG}{_name}", getattr(yaml.SafeLoader, f"construct_yaml_{_name}"))
-_Loader.add_constructor(f"{_TAG}merge", yaml.SafeLoader.construct_yaml_str)
+    _make = getattr(yaml.SafeLoader, f"construct_yaml_{_name}")
+    _Loader.add_constructor(f"{_TAG}{_name}", _make)
+_make = yaml.SafeLoader.construct_yaml_str
+_Loader.add_constructor(f"{_TAG}merge", _make)
 _Loader.add_constructor(_ODD, _refuse_number)
 _Loader.add_constructor(None, _refuse_tag)
 
@@ -190,7 +193,7 @@ def parse(text: str, label: str) -> Any:
     if len(text) > N_BYTES_MAX:
         raise ConfigError(f"{label}: {len(text)} characters (allowed {N_BYTES_MAX})")
     try:
-        return yaml.load(text, Loader=_Loader)  # type: ignore[arg-type]  # the loader takes text alone
+        return yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""

@@ -11,6 +11,7 @@ from contextlib import suppress
 
 import typer
 
+from ivl import files
 from ivl.cli import (
     bench,
     can_gateway,
@@ -31,7 +32,6 @@ from ivl.cli import (
     sil,
     sweep,
 )
-from ivl import files
 from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
 
 app = typer.Typer(

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from ivl import experiment, outcome
+from ivl import experiment, files, outcome
 from ivl.cli import console, policy_options
 from ivl.errors import ConfigError, LinkError
 from ivl.experiment import Experiment

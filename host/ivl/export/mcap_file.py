@@ -5,7 +5,8 @@
     /ivl/scene   foxglove.SceneUpdate      ceiling (again in each row if it moves) and body once, legs in each row
     /ivl/state   ivl.State                 every column of the trace by name, and the phase in words
 
-Time begins at 0 with the landing; of a file with times below 0, with its first row. Messages are JSON, so that no other library is needed to read them.
+Time begins at 0 with the landing; of a file with times below 0, with its first row. Messages are JSON, so that no
+other library is needed to read them.
 """
 
 import json

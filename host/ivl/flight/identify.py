@@ -22,7 +22,7 @@ import numpy as np
 from scipy import stats  # type: ignore[import-untyped]
 from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
-from ivl import model, native
+from ivl import model, native, yamlfile
 from ivl.errors import ConfigError
 from ivl.flight import compare, motion
 from ivl.flight.motion import Flip

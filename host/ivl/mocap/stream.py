@@ -170,7 +170,7 @@ class Mocap:
     # ---- the thread
 
     def _run(self) -> None:
-        """Follow the body; if that fails, for whatever reason, the body is lost, and the guard is told so to the end."""
+        """Follow the body; if that fails, for any reason, the body is lost, and the guard is told so to the end."""
         try:
             self._follow()
         except Exception as error:  # noqa: BLE001 - a guard that is silent would let a vehicle fly on

@@ -21,7 +21,6 @@ BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 SKY, PURPLE, GREY, DIM = "#56B4E9", "#CC79A7", "#7F7F7F", "#555555"
 SMALL, NORMAL = 8.0, 9.0
 DPI = 200
-_SETTINGS: dict[str, Any] = {"svg.hashsalt": "ivl"}
 _NO_DATE: dict[str, dict[str, Any]] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 
 Arguments = ParamSpec("Arguments")
@@ -37,7 +36,7 @@ def drawing(draw: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
         global _depth  # noqa: PLW0603 - as global as the settings that it tells of
         with mpl.rc_context():
             mpl.rcdefaults()
-            mpl.rcParams.update(_SETTINGS)
+            mpl.rcParams["svg.hashsalt"] = "ivl"
             _depth += 1
             try:
                 return draw(*args, **kwargs)

@@ -1,8 +1,9 @@
 """The run folder of a sweep: open columnar files that are there whole or not at all.
 
 A finished task leaves one Parquet part of each kind of table, named after the task; that of `tasks` is written last and
-vouches for the others: it carries their digests. Files that no task vouches for are no part of the run. So a run that was cut off at any moment loses the running tasks and nothing else, and
-what is done can be read while the rest is still flown.
+vouches for the others: it carries their digests. Files that no task vouches for are no part of the run. So a run that
+was cut off at any moment loses the running tasks and nothing else, and what is done can be read while the rest is still
+flown.
 """
 
 import hashlib
