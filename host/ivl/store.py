@@ -2,7 +2,9 @@
 
     config.yaml     the resolved experiment
     manifest.json   schema version, seed, trials, hashes of model and library, versions, units
-    run.sqlite      rollouts, episodes, learner states, and what the columns of policy and reward mean
+    run.sqlite      rollouts, episodes, learner states, what the columns of policy and reward mean, and seals: digests of
+                    finished episodes and learner states, so that a damaged number is found and not read
+    files/          copies of the files that the configuration names
 
 SQLite in WAL mode with synchronous=FULL: a commit is on the disk when it returns, and a transaction is there whole or
 not at all. An episode passes three commits: *planned* (policies and the learners' states after `ask`), *scored* (each
@@ -13,6 +15,7 @@ bit. SQLite stores float64 exactly, but for the sign of a zero; NaN is stored as
 
 import errno
 import fcntl
+import hashlib
 import json
 import math
 import os
@@ -41,6 +44,8 @@ SCHEMA_VERSION = 2
 
 _ROLLOUT_KEY = "trial INTEGER, episode INTEGER, idx INTEGER"
 _SEARCH = ("mu", "sigma", "recommended")
+_OF_LEARNER = -1
+"""Number in the table of seals, in place of an episode's, of the seal of a learner's state."""
 _SNAPSHOT_TRIES = 20
 _SQLITE_ADVICE = {
     sqlite3.SQLITE_FULL: "make room there",
@@ -154,6 +159,7 @@ class RunStore:
             if not known or [c for c in known if c.startswith("out_")] != list(self._outcome_columns):
                 raise StoreError(f"{self.folder}: run.sqlite has other columns than the outcomes of this version")
             self.layout = self._read_layout()
+            self._check_seals()
             undo.pop_all()
         return self
 
@@ -234,6 +240,7 @@ class RunStore:
                 f"INSERT INTO episode VALUES({_marks(('trial', 'episode', *self._figures()))})", values
             )
             self._save_states([r.trial for r in rows], states)
+            self._seal((r.trial, r.episode, self._digest(r.trial, r.episode)) for r in rows)
 
     def learner_states(self) -> dict[int, dict[str, Any]]:
         """The last saved state of each trial's learner."""
@@ -300,6 +307,7 @@ class RunStore:
             f"CREATE TABLE episode(trial INTEGER, episode INTEGER, {figures}, PRIMARY KEY(trial, episode))"
         )
         self._db.execute("CREATE TABLE learner(trial INTEGER PRIMARY KEY, state TEXT NOT NULL)")
+        self._db.execute("CREATE TABLE seal(trial INTEGER, episode INTEGER, sha256 TEXT, PRIMARY KEY(trial, episode))")
         self._db.execute("CREATE TABLE quantity(role TEXT, place INTEGER, name TEXT, unit TEXT, doc TEXT)")
         rows = [
             (role, place, quantity.name, quantity.unit, quantity.doc)
@@ -318,6 +326,36 @@ class RunStore:
     def _save_states(self, trials: Sequence[int], states: Iterable[Mapping[str, Any]]) -> None:
         rows = [(trial, json.dumps(state, allow_nan=False)) for trial, state in zip(trials, states, strict=True)]
         self._db.executemany("INSERT OR REPLACE INTO learner(trial, state) VALUES(?,?)", rows)
+        self._seal((trial, _OF_LEARNER, hashlib.sha256(state.encode()).hexdigest()) for trial, state in rows)
+
+    def _seal(self, rows: Iterable[tuple[int, int, str]]) -> None:
+        self._db.executemany("INSERT OR REPLACE INTO seal(trial, episode, sha256) VALUES(?,?,?)", rows)
+
+    def _digest(self, trial: int, episode: int) -> str:
+        """Digest of a finished episode, of its rollouts and of its figures."""
+        said = hashlib.sha256()
+        for table, order in (("rollout", " ORDER BY idx"), ("episode", "")):
+            query = f"SELECT * FROM {table} WHERE trial=? AND episode=?{order}"
+            for row in self._db.execute(query, (trial, episode)):
+                said.update(repr(row).encode())
+        return said.hexdigest()
+
+    def _check_seals(self) -> None:
+        """Refuse a database in which a number is not what was written; SQLite itself would not notice."""
+        if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name='seal'").fetchone():
+            return  # of an earlier version, which made none
+        states = dict(self._db.execute("SELECT trial, state FROM learner"))
+        sealed = {(trial, episode): sha for trial, episode, sha in self._db.execute("SELECT * FROM seal")}
+        finished = set(self._db.execute("SELECT trial, episode FROM episode"))
+        for (trial, episode), sha256 in sealed.items():
+            text = states.get(trial, "")
+            found = (
+                hashlib.sha256(text.encode()).hexdigest() if episode == _OF_LEARNER else self._digest(trial, episode)
+            )
+            if found != sha256:
+                raise ValueError(f"trial {trial}, episode {episode}: not as it was written")
+        if finished != {key for key in sealed if key[1] != _OF_LEARNER} or len(states) != len(sealed) - len(finished):
+            raise ValueError("episodes are missing")
 
     def _flatten(self, outcomes: Outcomes) -> list[list[Any]]:
         """One list for each column of `_outcome_columns`."""

@@ -67,8 +67,8 @@ def read(path: Path) -> np.recarray[Any, Any]:
     """The rows of a trace as `write` wrote them, a record array of the library's trace table.
 
     Raises:
-        ConfigError: The file cannot be read, a column is missing, a cell is no number, is empty where it is needed, or is
-            not whole where it counts; or times do not rise.
+        ConfigError: The file cannot be read, a column is missing, a cell is no number, is empty where it is needed, or
+            is not whole where it counts; or times do not rise.
     """
     return rows_of(read_table(path))
 

@@ -60,7 +60,7 @@ _PLAIN = (
 class _Loader(yaml.SafeLoader):
     """The core schema of YAML 1.2 with merge keys, within limits."""
 
-    yaml_implicit_resolvers: ClassVar[dict[Any, Any]] = {}
+    yaml_implicit_resolvers: dict[Any, Any] = {}  # noqa: RUF012 - as PyYAML declares it
     yaml_constructors: ClassVar[dict[Any, Any]] = {}
 
     def __init__(self, text: str) -> None:
@@ -171,11 +171,10 @@ def _refuse_tag(loader: Any, node: Any) -> Any:  # noqa: ARG001 - PyYAML's own i
 
 for _name, _make in {"bool": _bool, "null": _null, "int": _int, "float": _float}.items():
     _Loader.add_constructor(f"{_TAG}{_name}", _make)
+_SAFE: Any = yaml.SafeLoader
 for _name in ("str", "seq", "map"):
-    _make = getattr(yaml.SafeLoader, f"construct_yaml_{_name}")
-    _Loader.add_constructor(f"{_TAG}{_name}", _make)
-_make = yaml.SafeLoader.construct_yaml_str
-_Loader.add_constructor(f"{_TAG}merge", _make)
+    _Loader.add_constructor(f"{_TAG}{_name}", _SAFE.yaml_constructors[f"{_TAG}{_name}"])
+_Loader.add_constructor(f"{_TAG}merge", _SAFE.yaml_constructors[f"{_TAG}str"])
 _Loader.add_constructor(_ODD, _refuse_number)
 _Loader.add_constructor(None, _refuse_tag)
 
