@@ -101,6 +101,21 @@ def save(copies: Mapping[str, bytes], folder: Path) -> None:
         files.write(path, content)
 
 
+def check(folder: Path) -> None:
+    """Refuse copies in a run folder that are not as they were written.
+
+    Raises:
+        ConfigError: One is damaged, or cannot be read.
+    """
+    for path in sorted((folder / FOLDER).glob("*.y*ml")):
+        try:
+            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        except OSError as error:
+            raise ConfigError(f"{path}: cannot be read: {files.reason(error)}") from error
+        if not path.stem.endswith(f"-{digest[:_DIGITS]}"):
+            raise ConfigError(f"{path}: is not as it was written")
+
+
 def _is_copy(text: str) -> bool:
     return text.startswith(f"{FOLDER}/")
 

@@ -148,7 +148,15 @@ def read_config(folder: Path) -> tuple[Experiment, int | None]:
     """
     manifest = read_manifest(folder)
     check_version(folder, manifest, SCHEMA_VERSION)  # before the configuration, which may have changed its form too
-    data = read_mapping(folder / "config.yaml")
+    path = folder / "config.yaml"
+    try:
+        damaged = hashlib.sha256(path.read_bytes()).hexdigest() != manifest.get("config_sha256")
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {files.reason(error)}") from error
+    if damaged:
+        raise StoreError(f"{path}: is not as it was written")
+    references.check(folder)
+    data = read_mapping(path)
     return experiment.from_data(data, str(folder / "config.yaml")), manifest.get("trials")
 
 

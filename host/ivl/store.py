@@ -2,8 +2,8 @@
 
     config.yaml     the resolved experiment
     manifest.json   schema version, seed, trials, hashes of model and library, versions, units
-    run.sqlite      rollouts, episodes, learner states, what the columns of policy and reward mean, and seals: digests of
-                    finished episodes and learner states, so that a damaged number is found and not read
+    run.sqlite      rollouts, episodes, learner states, what the columns of policy and reward mean, and seals: digests
+                    of finished episodes and learner states, so that a damaged number is found and not read
     files/          copies of the files that the configuration names
 
 SQLite in WAL mode with synchronous=FULL: a commit is on the disk when it returns, and a transaction is there whole or

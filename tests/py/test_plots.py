@@ -80,8 +80,9 @@ def test_a_figure_that_cannot_be_written_is_named(tmp_path: Path, name: str) -> 
 
 def test_a_picture_has_the_same_bytes_whatever_the_settings_around_it(tmp_path: Path) -> None:
     code = (
-        "import sys, pathlib, matplotlib as mpl\n"
+        "import sys, pathlib\n"
         "from ivl.plots import style\n"
+        "import matplotlib as mpl\n"
         "mpl.rcParams.update({'font.size': 30, 'axes.grid': True} if sys.argv[2] == 'odd' else {})\n"
         "before = dict(mpl.rcParams)\n"
         "@style.drawing\n"

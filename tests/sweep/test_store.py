@@ -118,7 +118,7 @@ def test_parts_of_another_version_or_shape_and_torn_ones_are_refused(small: Swee
         path.write_bytes(damaged)
         with pytest.raises(StoreError, match=r"000000\.parquet: is not as it was written; --resume"):
             store.read_trials(run)
-        assert store.finished_tasks(run) == set()
+        assert 0 not in store.finished_tasks(run)
     without_digests(run)
     path.write_bytes(content[:-100])
     with pytest.raises(StoreError, match=r"000000\.parquet: cannot be read"):
@@ -133,6 +133,8 @@ def test_parts_of_another_version_or_shape_and_torn_ones_are_refused(small: Swee
 
 def without_digests(run: Path) -> None:
     """Make the run one that was written before tasks vouched for their parts."""
+    manifest = json.loads((run / "manifest.json").read_text())
+    (run / "manifest.json").write_text(json.dumps({**manifest, "vouched": False}))
     for path in (run / "tasks").glob("*.parquet"):
         table = pq.read_table(path)
         kept = {key: value for key, value in table.schema.metadata.items() if key != store.INDEX_KEY}

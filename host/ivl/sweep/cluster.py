@@ -14,6 +14,7 @@ import os
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import dask
@@ -142,11 +143,24 @@ def _slurm(workers: int | None) -> Any:
     except ImportError as error:
         raise ConfigError("--scheduler slurm: dask-jobqueue is not installed (extra `cluster`)") from error
     try:
-        cluster = jobqueue.SLURMCluster(security=_security(), scheduler_options={"dashboard": False})
+        cluster = jobqueue.SLURMCluster(
+            security=_security(), shared_temp_directory=_shared_folder(), scheduler_options={"dashboard": False}
+        )
     except ValueError as error:
         raise ConfigError(f"--scheduler slurm: jobqueue.slurm in Dask's configuration: {error}") from error
     cluster.scale(workers)
     return cluster
+
+
+def _shared_folder() -> str:
+    """Where a batch system's cluster has its certificates: all its machines see this folder, and its owner alone."""
+    chosen = dask.config.get("jobqueue.slurm.shared-temp-directory", None)
+    if chosen:
+        return str(chosen)
+    folder = Path.home() / ".cache" / "ivl"
+    folder.mkdir(parents=True, exist_ok=True)
+    folder.chmod(0o700)
+    return str(folder)
 
 
 def _connect(address: str) -> Any:

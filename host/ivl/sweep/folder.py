@@ -85,6 +85,7 @@ def make_manifest(grid: Sweep | PolicyMap, worlds: Mapping[str, World], task_siz
     layout = EMPTY if isinstance(grid, PolicyMap) else layout_of(grid)
     return {
         "schema_version": schema.SCHEMA_VERSION,
+        "vouched": True,
         _kind(grid): grid.model_dump(mode="json"),
         "vehicle": grid.vehicle,
         "gear_set": grid.gear_set,

@@ -27,7 +27,7 @@ from ivl.sweep import schema
 from ivl.sweep.schema import CELL, KINDS, SCHEMA_VERSION, TASKS, TRIAL_KEY, VERSION_KEY
 
 INDEX_KEY = b"ivl_parts"
-"""Key of the metadata of a part of `tasks`: SHA-256 of each other part of the task, by kind, as JSON."""
+"""Key of the metadata of a part of `tasks`: SHA-256 of each other part of the task, by kind, as `sealed` writes it."""
 _PART = re.compile(r"\d{6,}\.parquet")
 
 _SORT = {
@@ -172,12 +172,24 @@ def _vouched(path: Path) -> dict[str, str] | None:
     try:
         table = pq.read_table(io.BytesIO(path.read_bytes()))
         numbers = table.column("task").to_pylist()
-        index = json.loads((table.schema.metadata or {}).get(INDEX_KEY, b"null"))
-    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+        text = (table.schema.metadata or {}).get(INDEX_KEY)
+        index = None if text is None else json.loads(text)
+        if index is not None and sealed(table, index["parts"]) != text:
+            raise ValueError("it is not as it was written")
+    except (OSError, pa.ArrowException, KeyError, ValueError, TypeError) as error:
         raise StoreError(f"{path}: cannot be read: {error}; continue the run with --resume") from error
     if numbers != [int(path.stem)]:
         raise StoreError(f"{path}: is the record of task {numbers}: remove it, then continue the run with --resume")
-    return index if isinstance(index, dict) else None
+    if index is None and read_manifest(path.parents[1]).get("vouched"):
+        raise StoreError(f"{path}: is not as it was written; continue the run with --resume")
+    return None if index is None else dict(index["parts"])
+
+
+def sealed(table: pa.Table, parts: Mapping[str, str]) -> bytes:
+    """Digests of the parts of a task, with one of themselves and of the record `table` that carries them."""
+    rows = json.dumps([dict(parts), table.to_pylist()], sort_keys=True)
+    seal = {"parts": dict(parts), "sha256": hashlib.sha256(rows.encode()).hexdigest()}
+    return json.dumps(seal, sort_keys=True).encode()
 
 
 def _is_vouched(path: Path, kind: str, index: Mapping[str, str] | None) -> bool:

@@ -4,7 +4,6 @@ A worker needs this package and the native library, and nothing of the client's 
 """
 
 import hashlib
-import json
 import os
 import pickle
 import platform
@@ -23,7 +22,7 @@ from ivl.errors import NativeError
 from ivl.sweep import policymap, schema, tables, trials
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.plan import DaskTask
-from ivl.sweep.store import INDEX_KEY
+from ivl.sweep.store import INDEX_KEY, sealed
 from ivl.sweep.trials import Trial
 from ivl.sweep.vary import as_cell
 from ivl.world import World
@@ -137,9 +136,7 @@ def record(task: DaskTask, done: Done) -> bytes:
     }
     table = tables.make_table(schema.TASKS, columns)
     index = {kind: hashlib.sha256(part).hexdigest() for kind, part in done.parts.items()}
-    return tables.encode(
-        table.replace_schema_metadata({**table.schema.metadata, INDEX_KEY: json.dumps(index, sort_keys=True).encode()})
-    )
+    return tables.encode(table.replace_schema_metadata({**table.schema.metadata, INDEX_KEY: sealed(table, index)}))
 
 
 def _with_varied(table: pa.Table, task: DaskTask) -> pa.Table:
