@@ -28,6 +28,7 @@ Examples:
       the frames that people look at, for candump and SavvyCAN
 """
 _REPORT_S = 0.2
+_NETWORKED = "udp_multicast"
 
 
 def can_gateway(
@@ -61,7 +62,9 @@ def can_gateway(
         raise ConfigError("exactly one of --listen (end at the host) and --to (end at the vehicle) is needed")
     if interface is None:
         raise ConfigError("--interface is needed, and for most interfaces --channel")
-    options = gateway.Options(node, _address(listen, "--listen"), _address(to, "--to"), fd, allow_arming)
+    options = gateway.Options(
+        node, _address(listen, "--listen"), _address(to, "--to"), fd, allow_arming, interface == _NETWORKED
+    )
     bus = _open_bus(interface, channel, bitrate, data_bitrate, fd, bus_options or [])
     try:
         end = gateway.make_gateway(bus, options)
@@ -103,6 +106,8 @@ def _open_bus(
     import can
 
     settings: dict[str, Any] = {"bitrate": bitrate, "data_bitrate": data_bitrate, "fd": fd or None}
+    if interface == _NETWORKED:
+        settings["hop_limit"] = 0  # frames stay on this machine unless somebody says otherwise
     for text in more:
         name, equals, value = text.partition("=")
         if not equals or not name:

@@ -1,4 +1,4 @@
-"""Pictures of runs, campaigns, policies and flights, drawn with matplotlib; `style` has what they share."""
+"""Figures, one per file; each `draw` function takes data and paths and returns the files it wrote."""
 
 import os
 
