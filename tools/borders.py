@@ -316,7 +316,7 @@ def trace_is_wrong(path: Path) -> bool:
             return any(not np.array_equal(table[name], rows[name], equal_nan=True) for name in rows)
     lines = list(csv.DictReader(io.StringIO(path.read_text("utf-8-sig"))))
     for name, column in rows.items():
-        said = [float(Decimal(line[name].strip() or "nan")) for line in lines if any(line.values())]
+        said = [decimal(line[name].strip() or "nan") for line in lines if any(line.values())]
         if not np.array_equal(np.array(said, dtype=column.dtype), column, equal_nan=column.dtype.kind == "f"):
             return True
     return False
@@ -497,12 +497,12 @@ def main() -> None:
             raise SystemExit(code.said)
         kinds: list[tuple[str, int, Callable[[Row, int], None]]] = [
             ("spellings of a number in YAML", 20_000, lambda r, n: try_scalars(r, n, folder, rng)),
-            ("damaged experiment, vehicle and gear files", 450, lambda r, n: try_yaml(r, n, folder, rng)),
-            ("damaged traces, CSV", 300, lambda r, n: try_traces(r, n, folder, rng, ".csv")),
-            ("damaged traces, npz", 200, lambda r, n: try_traces(r, n, folder, rng, ".npz")),
-            ("damaged runs of `ivl learn` (SQLite, JSON, YAML)", 300, lambda r, n: try_run(r, n, folder, rng, good)),
-            ("damaged sweeps (Parquet, JSON)", 250, lambda r, n: try_sweep(r, n, folder, rng, small_sweep(folder))),
-            ("damaged policies", 200, lambda r, n: try_policies(r, n, folder, rng)),
+            ("damaged experiment, vehicle and gear files", 400, lambda r, n: try_yaml(r, n, folder, rng)),
+            ("damaged traces, CSV", 250, lambda r, n: try_traces(r, n, folder, rng, ".csv")),
+            ("damaged traces, npz", 150, lambda r, n: try_traces(r, n, folder, rng, ".npz")),
+            ("damaged runs of `ivl learn` (SQLite, JSON, YAML)", 240, lambda r, n: try_run(r, n, folder, rng, good)),
+            ("damaged sweeps (Parquet, JSON)", 200, lambda r, n: try_sweep(r, n, folder, rng, small_sweep(folder))),
+            ("damaged policies", 150, lambda r, n: try_policies(r, n, folder, rng)),
         ]
         for kind, n, attempt in kinds:
             row = Row(kind)

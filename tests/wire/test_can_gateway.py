@@ -381,3 +381,63 @@ def test_the_programs_over_multicast(connect: Any, vehicle: Vehicle) -> None:
     reports = [json.loads(output) for output, _ in outputs]
     assert all(report["n_packets_in"] > 80 for report in reports)
     assert reports[0]["n_given_up"] == 0
+
+
+class StrangeBus(VirtualBus):
+    """What a bus made of network packets may bring: nothing that can be decoded, or a message with odd parts."""
+
+    def __init__(self, channel: str) -> None:
+        super().__init__(channel)
+        self.strange: list[Any] = []
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        if self.strange:
+            odd = self.strange.pop()
+            if isinstance(odd, Exception):
+                raise can.CanOperationError("could not unpack received message") from odd
+            return can.Message(check=False, **odd)
+        return super().recv(timeout)
+
+
+def test_what_is_no_frame_is_counted_and_ends_nothing(vehicle: Vehicle) -> None:
+    channel = f"strange-{id(vehicle)}"
+    bus, other = StrangeBus(channel), LossyBus(channel)
+    host = End(bus, Options(2, listen=("127.0.0.1", free_port()), networked=True))
+    far = End(other, Options(2, to=("127.0.0.1", vehicle.port)))
+    try:
+        wait_for(lambda: host.gateway.report()["up"], "link up")
+        bus.strange = [
+            ValueError("a 1-byte datagram"),
+            {"arbitration_id": -5},
+            {"arbitration_id": "x"},
+            {"is_error_frame": True, "arbitration_id": 0x40},
+        ]
+        wait_for(lambda: not bus.strange and host.gateway.report()["n_bad"] >= 3, "bad frames are counted")
+        assert host.gateway.report()["n_error_frames"] == 1
+        assert host.gateway.report()["up"]
+        assert host.is_alive()
+    finally:
+        for end in (host, far):
+            end.stop()
+            end.bus.shutdown()
+
+
+def test_the_first_client_keeps_the_vehicle(pair: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    both = pair()
+    end = both.host.gateway
+    first, second = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+    for each in (first, second):
+        each.bind(("127.0.0.1", 0))
+    try:
+        first.sendto(b"\xf3", ("127.0.0.1", both.port))
+        wait_for(lambda: end._client == first.getsockname(), "the first is the client")
+        monkeypatch.setattr(gateway, "CLIENT_S", 1e9)
+        second.sendto(b"\xf3", ("127.0.0.1", both.port))
+        wait_for(lambda: end.report()["n_foreign"] == 1, "the second is not heard")
+        assert end._client == first.getsockname()
+        monkeypatch.setattr(gateway, "CLIENT_S", 0.0)
+        second.sendto(b"\xf3", ("127.0.0.1", both.port))
+        wait_for(lambda: end._client == second.getsockname(), "the first has gone")
+    finally:
+        first.close()
+        second.close()

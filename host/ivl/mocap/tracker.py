@@ -115,7 +115,7 @@ class Tracker:
     def _frame(self, line: bytes) -> Frame | None:
         """The frame of a line; None if it is another event, or nothing that the process would say."""
         try:
-            event = json.loads(line)
+            event = dict(json.loads(line))
             if "error" in event:
                 self.failure = str(event["error"])
             if "bodies" not in event:
