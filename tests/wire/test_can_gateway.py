@@ -422,22 +422,18 @@ def test_what_is_no_frame_is_counted_and_ends_nothing(vehicle: Vehicle) -> None:
             end.bus.shutdown()
 
 
-def test_the_first_client_keeps_the_vehicle(pair: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    both = pair()
-    end = both.host.gateway
-    first, second = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
-    for each in (first, second):
-        each.bind(("127.0.0.1", 0))
+def test_the_first_client_keeps_the_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
+    bus = VirtualBus("first-client")
     try:
-        first.sendto(b"\xf3", ("127.0.0.1", both.port))
-        wait_for(lambda: end._client == first.getsockname(), "the first is the client")
+        end: Any = make_gateway(bus, Options(2, listen=("127.0.0.1", 0)))
         monkeypatch.setattr(gateway, "CLIENT_S", 1e9)
-        second.sendto(b"\xf3", ("127.0.0.1", both.port))
-        wait_for(lambda: end.report()["n_foreign"] == 1, "the second is not heard")
-        assert end._client == first.getsockname()
-        monkeypatch.setattr(gateway, "CLIENT_S", 0.0)
-        second.sendto(b"\xf3", ("127.0.0.1", both.port))
-        wait_for(lambda: end._client == second.getsockname(), "the first has gone")
+        end.datagram_received(b"\xf3", ("127.0.0.1", 1))
+        end.datagram_received(b"\x3c\x00", ("127.0.0.1", 2))
+        assert end._client == ("127.0.0.1", 1)
+        assert end.report()["n_foreign"] == 1
+        monkeypatch.setattr(gateway, "CLIENT_S", -1.0)
+        end.datagram_received(b"\xf3", ("127.0.0.1", 2))
+        assert end._client == ("127.0.0.1", 2)
+        assert end.report()["n_foreign"] == 1
     finally:
-        first.close()
-        second.close()
+        bus.shutdown()

@@ -130,7 +130,7 @@ class Heard:
     def __init__(self) -> None:
         self.states: list[tuple[Status, str]] = []
 
-    def look(self, status: Status, *_: object) -> None:
+    def look(self, status: Status, text: str, now_s: float) -> None:
         assert text.startswith("motion capture: ")
         assert now_s > 0
         if self.statuses[-1:] != [status]:
