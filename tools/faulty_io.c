@@ -15,34 +15,44 @@
 
 static char folder[4096];
 static long strike_at = -1, count;
-static int error_number; /* 0: SIGKILL */
+static int  error_number; /* 0: SIGKILL */
 
-void ivl_fault_arm(const char *path, long at, int error) {
+void ivl_fault_arm(const char *path, long at, int error)
+{
     snprintf(folder, sizeof folder, "%s", path);
     count = 0;
     error_number = error;
     strike_at = at;
 }
 
-long ivl_fault_count(void) { return count; }
+long ivl_fault_count(void)
+{
+    return count;
+}
 
-static int strikes(const char *path) {
-    if (strike_at < 0 || strncmp(path, folder, strlen(folder)) != 0) {
+static int strikes(const char *path)
+{
+    if (strike_at < 0 || strncmp(path, folder, strlen(folder)) != 0)
+    {
         return 0;
     }
     long now = count++;
-    if (now < strike_at || (now > strike_at && error_number != ENOSPC)) {
+    if (now < strike_at || (now > strike_at && error_number != ENOSPC))
+    {
         return 0;
     }
-    if (error_number == 0) {
+    if (error_number == 0)
+    {
         raise(SIGKILL);
     }
     errno = error_number;
     return 1;
 }
 
-static int strikes_fd(int fd) {
-    if (strike_at < 0) {
+static int strikes_fd(int fd)
+{
+    if (strike_at < 0)
+    {
         return 0;
     }
     char link[64], path[4096];
@@ -54,20 +64,23 @@ static int strikes_fd(int fd) {
 
 #define REAL(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
 
-#define OPEN(name)                                                                                                     \
-    int name(const char *path, int flags, ...) {                                                                       \
-        va_list rest;                                                                                                  \
-        va_start(rest, flags);                                                                                         \
-        mode_t mode = va_arg(rest, mode_t);                                                                            \
-        va_end(rest);                                                                                                  \
-        return (flags & (O_WRONLY | O_RDWR)) && strikes(path) ? -1 : REAL(name)(path, flags, mode);                    \
+#define OPEN(name)                                                                                                                         \
+    int name(const char *path, int flags, ...)                                                                                             \
+    {                                                                                                                                      \
+        va_list rest;                                                                                                                      \
+        va_start(rest, flags);                                                                                                             \
+        mode_t mode = va_arg(rest, mode_t);                                                                                                \
+        va_end(rest);                                                                                                                      \
+        return (flags & (O_WRONLY | O_RDWR)) && strikes(path) ? -1 : REAL(name)(path, flags, mode);                                        \
     }
 OPEN(open)
 OPEN(open64)
 
 /* a write that fails has written half of it */
-ssize_t write(int fd, const void *data, size_t n) {
-    if (!strikes_fd(fd)) {
+ssize_t write(int fd, const void *data, size_t n)
+{
+    if (!strikes_fd(fd))
+    {
         return REAL(write)(fd, data, n);
     }
     int error = errno;
@@ -76,8 +89,10 @@ ssize_t write(int fd, const void *data, size_t n) {
     return -1;
 }
 
-ssize_t pwrite64(int fd, const void *data, size_t n, off64_t offset) {
-    if (!strikes_fd(fd)) {
+ssize_t pwrite64(int fd, const void *data, size_t n, off64_t offset)
+{
+    if (!strikes_fd(fd))
+    {
         return REAL(pwrite64)(fd, data, n, offset);
     }
     int error = errno;
@@ -86,9 +101,27 @@ ssize_t pwrite64(int fd, const void *data, size_t n, off64_t offset) {
     return -1;
 }
 
-int fsync(int fd) { return strikes_fd(fd) ? -1 : REAL(fsync)(fd); }
-int fdatasync(int fd) { return strikes_fd(fd) ? -1 : REAL(fdatasync)(fd); }
-int ftruncate64(int fd, off64_t length) { return strikes_fd(fd) ? -1 : REAL(ftruncate64)(fd, length); }
-int rename(const char *from, const char *to) { return strikes(to) ? -1 : REAL(rename)(from, to); }
-int unlink(const char *path) { return error_number != ENOSPC && strikes(path) ? -1 : REAL(unlink)(path); }
-int flock(int fd, int how) { return error_number == ENOLCK && strikes_fd(fd) ? -1 : REAL(flock)(fd, how); }
+int fsync(int fd)
+{
+    return strikes_fd(fd) ? -1 : REAL(fsync)(fd);
+}
+int fdatasync(int fd)
+{
+    return strikes_fd(fd) ? -1 : REAL(fdatasync)(fd);
+}
+int ftruncate64(int fd, off64_t length)
+{
+    return strikes_fd(fd) ? -1 : REAL(ftruncate64)(fd, length);
+}
+int rename(const char *from, const char *to)
+{
+    return strikes(to) ? -1 : REAL(rename)(from, to);
+}
+int unlink(const char *path)
+{
+    return error_number != ENOSPC && strikes(path) ? -1 : REAL(unlink)(path);
+}
+int flock(int fd, int how)
+{
+    return error_number == ENOLCK && strikes_fd(fd) ? -1 : REAL(flock)(fd, how);
+}
