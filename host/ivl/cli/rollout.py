@@ -62,7 +62,7 @@ def rollout(
         else {"form": name, "theta": policy_options.theta_of(name, theta, rrev, moment)}
     )
     numbers = {"seed": seed, "stream": stream, "d_ceil_m": distance}
-    data = chosen.fields(learned.tasks[0] if learned is not None else None)
+    data = chosen.fields(*(learned.tasks if learned is not None else ()))
     for name in ("speed_mps", "angle_deg"):
         if name not in data:
             raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")

@@ -61,7 +61,7 @@ def sil(
 ) -> None:
     """Start the software vehicle; HELP is the text that people see."""
     learned = policy_options.load(policy_file)
-    world = chosen.make_world(learned.tasks[0] if learned is not None else None)
+    world = chosen.make_world(*(learned.tasks if learned is not None else ()))
     text = model_text(world)
     if write_model is not None:
         files.write(write_model, text)

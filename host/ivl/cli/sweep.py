@@ -96,8 +96,10 @@ def sweep(
     from ivl.sweep import config  # with Arrow and Dask it takes a second to load
 
     learned = policy_options.load(policy_file)
-    change = use.as_it_is(learned, learner) if learned is not None else None
+    change = use.as_it_is(learned, learner, vary or []) if learned is not None else None
     grid = config.load_sweep(path, settings or [], vary or [], change, learner=learner)
+    if learned is not None:
+        use.check_as_it_is(grid, learned, learner)
     base = f"{grid.name}-{references.title(grid.gear_set)}-{'-'.join(grid.learner_names())}"
     return _run(grid, base, "ivl sweep", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 

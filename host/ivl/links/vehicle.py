@@ -161,12 +161,13 @@ class Vehicle:
         self.trigger = LogBlock(
             ("ivl.trg_seq", "ivl.trg_d", "ivl.trg_rrev", "ivl.trg_of_y", "ivl.trg_vx", "ivl.trg_vz"), 50
         )
-        self._decision = LogBlock(("ivl.decided", "ivl.p_decided", "ivl.d_decided"), 50)
+        self._decision = LogBlock(("ivl.decided", "ivl.p_decided", "ivl.d_decided", "ivl.n_no_go"), 50)
+        self._n_no_go = 0
         self.config = LogBlock(("ivl.cfg_seq", "ivl.cfg_status", "ivl.cfg_bad", "ivl.cfg_crc"), 100)
         session.listen(_PORT_PLATFORM, _APP, self._on_app)
         for block in (self.watch, self.state, self.trigger, self._decision, self.config):
             session.start_log(block)
-        if not self.wait_in_wall_time(lambda: bool(self.watch.values), _LOGS_S):
+        if not self.wait_in_wall_time(lambda: bool(self.watch.values and self._decision.values), _LOGS_S):
             raise LinkError(f"{session.uri}: no log variables came within {_LOGS_S:g} s")
 
     def _on_app(self, data: bytes) -> None:
@@ -244,8 +245,9 @@ class Vehicle:
         self.session.send(_PORT_PLATFORM, _APP, encode_reading(rrev_per_s, of_y_radps, age_s))
 
     def begin_flight(self) -> None:
-        """Forget how the last flight was aborted, and a policy that was never confirmed."""
+        """Forget how the last flight was aborted, or called off, and a policy that was never confirmed."""
         self.abort_reason = self.aborted_by = ""
+        self._n_no_go = int(self._decision.values.get("ivl.n_no_go", 0))
         self._offer = None
 
     def abort(self, reason: str) -> None:
@@ -488,6 +490,10 @@ class Vehicle:
         if not values.get("ivl.decided", 0):
             return float("nan"), float("nan")
         return float(values["ivl.p_decided"]), float(values["ivl.d_decided"])
+
+    def was_called_off(self) -> bool:
+        """Whether its policy has called off an approach of this flight, whatever has become of the level-out since."""
+        return int(self._decision.values.get("ivl.n_no_go", 0)) != self._n_no_go
 
     def recording(self, policy_seq: int) -> Recording:
         """Download the flight recorder of the landing that flew a policy (errors as `recorder.download`)."""
