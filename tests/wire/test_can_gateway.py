@@ -403,3 +403,59 @@ def test_the_programs_over_multicast(connect: Any, vehicle: Vehicle) -> None:
     reports = [json.loads(output) for output, _ in outputs]
     assert all(report["n_packets_in"] > 80 for report in reports)
     assert reports[0]["n_given_up"] == 0
+
+
+class StrangeBus(VirtualBus):
+    """What a bus made of network packets may bring: nothing that can be decoded, or a message with odd parts."""
+
+    def __init__(self, channel: str) -> None:
+        super().__init__(channel)
+        self.strange: list[Any] = []
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        if self.strange:
+            odd = self.strange.pop()
+            if isinstance(odd, Exception):
+                raise can.CanOperationError("could not unpack received message") from odd
+            return can.Message(check=False, **odd)
+        return super().recv(timeout)
+
+
+def test_what_is_no_frame_is_counted_and_ends_nothing(vehicle: Vehicle) -> None:
+    channel = f"strange-{id(vehicle)}"
+    bus, other = StrangeBus(channel), LossyBus(channel)
+    host = End(bus, Options(2, listen=("127.0.0.1", free_port()), networked=True))
+    far = End(other, Options(2, to=("127.0.0.1", vehicle.port)))
+    try:
+        wait_for(lambda: host.gateway.report()["up"], "link up")
+        bus.strange = [
+            ValueError("a 1-byte datagram"),
+            {"arbitration_id": -5},
+            {"arbitration_id": "x"},
+            {"is_error_frame": True, "arbitration_id": 0x40},
+        ]
+        wait_for(lambda: not bus.strange and host.gateway.report()["n_bad"] >= 3, "bad frames are counted")
+        assert host.gateway.report()["n_error_frames"] == 1
+        assert host.gateway.report()["up"]
+        assert host.is_alive()
+    finally:
+        for end in (host, far):
+            end.stop()
+            end.bus.shutdown()
+
+
+def test_the_first_client_keeps_the_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
+    bus = VirtualBus("first-client")
+    try:
+        end: Any = make_gateway(bus, Options(2, listen=("127.0.0.1", 0)))
+        monkeypatch.setattr(gateway, "CLIENT_S", 1e9)
+        end.datagram_received(b"\xf3", ("127.0.0.1", 1))
+        end.datagram_received(b"\x3c\x00", ("127.0.0.1", 2))
+        assert end._client == ("127.0.0.1", 1)
+        assert end.report()["n_foreign"] == 1
+        monkeypatch.setattr(gateway, "CLIENT_S", -1.0)
+        end.datagram_received(b"\xf3", ("127.0.0.1", 2))
+        assert end._client == ("127.0.0.1", 2)
+        assert end.report()["n_foreign"] == 1
+    finally:
+        bus.shutdown()

@@ -43,8 +43,9 @@ class BusError(LinkError):
 class CanLink:
     """One end, at the host or at the vehicle; times are given by the caller."""
 
-    def __init__(self, bus: can.BusABC, node: int, at_host: bool, fd: bool = False) -> None:
-        """Speak with the other end of `node`'s link on `bus`."""
+    def __init__(self, bus: can.BusABC, node: int, at_host: bool, fd: bool = False, heeds_errors: bool = True) -> None:
+        """Speak with the other end of `node`'s link on `bus`; `heeds_errors`: error frames come from a controller."""
+        self._heeds_errors = heeds_errors
         self._bus, self.codec = bus, Codec(node)
         self._splitter, self._joiner = Splitter(node, at_host, fd), Joiner(node, not at_host)
         self._own, self._peer = ("HEARTBEAT_HOST", "HEARTBEAT_VEHICLE")[:: 1 if at_host else -1]
@@ -114,12 +115,17 @@ class CanLink:
         self.n_frames_in += 1
         if frame.is_error_frame:
             self.n_error_frames += 1
-            _check_error_frame(frame)
+            if self._heeds_errors:
+                _check_error_frame(frame)
             return None
         packet = self._joiner.join(frame)
         if packet is None:
             self._take_heartbeat(frame, t_s)
         return packet
+
+    def count_bad(self) -> None:
+        """Something came that was no frame."""
+        self._joiner.counts.n_bad += 1
 
     def beat(self, state: State, n_repeated: int, t_s: float) -> None:
         """Look at the bus and send a heartbeat, whenever it is time for it.

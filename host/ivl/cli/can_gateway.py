@@ -29,6 +29,7 @@ Examples:
 """
 _REPORT_S = 0.2
 _FULL_S = 5.0
+_NETWORKED = "udp_multicast"
 
 
 def can_gateway(
@@ -62,7 +63,9 @@ def can_gateway(
         raise ConfigError("exactly one of --listen (end at the host) and --to (end at the vehicle) is needed")
     if interface is None:
         raise ConfigError("--interface is needed, and for most interfaces --channel")
-    options = gateway.Options(node, _address(listen, "--listen"), _address(to, "--to"), fd, allow_arming)
+    options = gateway.Options(
+        node, _address(listen, "--listen"), _address(to, "--to"), fd, allow_arming, interface == _NETWORKED
+    )
     bus = _open_bus(interface, channel, bitrate, data_bitrate, fd, bus_options or [])
     try:
         end = gateway.make_gateway(bus, options)
@@ -104,6 +107,8 @@ def _open_bus(
     import can
 
     settings: dict[str, Any] = {"bitrate": bitrate, "data_bitrate": data_bitrate, "fd": fd or None}
+    if interface == _NETWORKED:
+        settings["hop_limit"] = 0  # frames stay on this machine unless somebody says otherwise
     for text in more:
         name, equals, value = text.partition("=")
         if not equals or not name:
@@ -135,6 +140,6 @@ async def _serve(end: Any) -> None:
         if report["up"] != said and not running.done():
             said = report["up"]
             text = "link up" if said else f"link down, other end: {report['peer']}"
-            console.err.print(f"node {end.options.node}: {text}", highlight=False, soft_wrap=True)
+            console.err.print(f"node {end.options.node}: {text}")
     if not running.cancelled():
         running.result()

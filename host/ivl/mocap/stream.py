@@ -101,6 +101,7 @@ class Mocap:
         self._has_connected = False
         self._bodies: tuple[str, ...] = ()
         self._failure = self._sink_error = ""
+        self._is_dead = False
 
     def start(self) -> None:
         """Start the process and the thread."""
@@ -169,6 +170,17 @@ class Mocap:
     # ---- the thread
 
     def _run(self) -> None:
+        """Follow the body; if that fails, for any reason, the body is lost, and the guard is told so to the end."""
+        try:
+            self._follow()
+        except Exception as error:  # noqa: BLE001 - a guard that is silent would let a vehicle fly on
+            with self._lock:
+                self._failure, self._is_dead = f"motion capture itself failed: {type(error).__name__}: {error}", True
+            while not self._ended.wait(TICK_S):
+                if self.guard is not None:
+                    self.guard.look(Status.FAILED, f"motion capture: {self._failure}", time.monotonic())
+
+    def _follow(self) -> None:
         assert self._tracker is not None
         while not self._ended.is_set():
             frames = self._tracker.poll(TICK_S)
@@ -223,7 +235,7 @@ class Mocap:
 
     def _state(self, now_s: float) -> MocapState:
         status = self._watch.status(now_s)
-        if self._failure and status is not Status.GOOD:
+        if self._failure and (self._is_dead or status is not Status.GOOD):
             status = Status.FAILED
         return MocapState(
             status,
