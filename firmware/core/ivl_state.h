@@ -80,8 +80,8 @@ typedef struct
     float          landed_s;    ///< ABORTED: how long the reference has been at land_height
     ivl_guard_t    guard;
     ivl_contact_t  contact;
-    ivl_distance_t distance;
     ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
     ivl_diag_t     diag;
+    ivl_distance_t distance;  ///< last, since it is the largest: offsets of the others stay short
 } ivl_state_t;
 #endif  // IVL_STATE_H

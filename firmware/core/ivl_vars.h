@@ -40,7 +40,7 @@
     X(float, "ivl", "d_sigma_max", d_sigma_norm_max, "1", 0.01, 10.0, 0.25, "a distance less certain than this part of itself is invalid")   \
     X(float, "ivl", "d_old_max", d_old_s_max, "s", 0.01, 1.0, 0.25, "a distance without a measurement for longer is invalid")                \
     X(float, "ivl", "rrev_delay", rrev_delay_s, "s", 0.0, 0.06, 0.0, "from the sampling instant of a measured RREV to its arrival")          \
-    X(float, "ivl", "range_delay", range_delay_s, "s", 0.0, 0.06, 0.0, "the same of a range")                                                \
+    X(float, "ivl", "range_delay", range_delay_s, "s", 0.0, 0.12, 0.0, "the same of a range")                                                \
     X(float, "ivl", "accel_delay", accel_delay_s, "s", 0.0, 0.02, 0.0, "delay of the accelerometer's low-pass")                              \
     X(float, "ivl", "rrev_max", rrev_per_s_max, "1/s", 0.1, 100.0, 20.0, "a measured RREV beyond this is ignored")                           \
     X(float, "ivl", "rrev_sigma", rrev_sigma_per_s, "1/s", 0.001, 10.0, 0.05, "standard deviation of a measured RREV: constant part")        \

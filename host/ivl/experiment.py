@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from ivl import forms, yamlfile
+from ivl import forms, references, yamlfile
 from ivl.belief.recording import Flight
 from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
@@ -236,6 +236,7 @@ def replace(data: dict[str, Any], replacements: Mapping[str, Any]) -> None:
     """Replace fields of raw data; None leaves what is there, `learner` is a name and drops the options."""
     for name, value in replacements.items():
         if value is not None:
+            value = references.absolute(value, Path.cwd()) if name in references.FIELDS else value  # noqa: PLW2901
             data[name] = {"name": value} if name == "learner" else value
 
 

@@ -6,7 +6,6 @@ fly near policies that landed, too, since a landing window is a small share of t
 """
 
 import os
-import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from ivl import files
 from ivl.belief import recording
 from ivl.belief.recording import Flight
 from ivl.family import Family
@@ -54,9 +54,8 @@ class Bank:
     def save(self, path: Path) -> None:
         """Write to a file; a reader never sees half of it."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
+        with files.replacing(path) as new, new.open("wb") as file:
             np.savez_compressed(file, z=self.z, theta=self.theta, landed=self.landed, features=self.features)
-        Path(file.name).replace(path)
 
     @staticmethod
     def load(path: Path) -> "Bank":

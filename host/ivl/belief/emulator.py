@@ -180,7 +180,11 @@ def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> La
     nets = []
     for number in range(_NETS):
         net = MLPClassifier(
-            _HIDDEN, alpha=_PENALTY, batch_size=min(_BATCH, len(y)), learning_rate_init=_RATE, random_state=seed + number
+            _HIDDEN,
+            alpha=_PENALTY,
+            batch_size=min(_BATCH, len(y)),
+            learning_rate_init=_RATE,
+            random_state=seed + number,
         )
         for _ in range(_EPOCHS):
             net.partial_fit(x, y, classes=[False, True])

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from ivl import experiment, outcome
+from ivl import experiment, files, outcome
 from ivl.cli import console, policy_options
 from ivl.cli.task_options import FLAGS
 from ivl.errors import ConfigError, LinkError
@@ -89,7 +89,7 @@ def fly(
         landing = source.fly_one(Rollout(tuple(values), seed, stream))
         end_reason = source.world.end_reason(int(landing.outcome["end_reason"][0]))
     if csv is not None and landing.recording is not None:
-        csv.write_text(landing.recording.to_csv(), encoding="utf-8")
+        files.write(csv, landing.recording.to_csv())
     result = {"snapshot": _snapshot(landing), "outcome": _outcome(landing.outcome, end_reason)}
     _print(result, source.warnings, as_json)
 
@@ -142,7 +142,7 @@ def _print(result: dict[str, Any], warnings: list[str], as_json: bool) -> None:
         console.out.print(title, style="bold")
         for name, value in values.items():
             text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
-            console.out.print(f"  {name:24s} {text}", highlight=False, soft_wrap=True)
+            console.out.print(f"  {name:24s} {text}")
 
 
 def _snapshot(landing: Any) -> dict[str, Any]:

@@ -99,4 +99,4 @@ def _result(world: World, flight: Trace) -> dict[str, Any]:
 def _report(result: dict[str, Any]) -> None:
     for name, value in result.items():
         text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
-        console.out.print(f"{name:24s} {text}", highlight=False, soft_wrap=True)
+        console.out.print(f"{name:24s} {text}")

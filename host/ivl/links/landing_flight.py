@@ -114,6 +114,8 @@ def check_abort(vehicle: Vehicle) -> None:
     """
     if vehicle.aborted_by and vehicle.abort_reason:
         raise RolloutError(f"aborted: {vehicle.abort_reason}")
+    if vehicle.spoiled_by:
+        raise RolloutError(f"not to be scored: {vehicle.spoiled_by}")
     if native.library().rules().get(vehicle.aborted_by, False):
         raise RolloutError(f"the vehicle aborted: {vehicle.aborted_by}")
 

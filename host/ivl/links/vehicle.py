@@ -146,6 +146,8 @@ class Vehicle:
         """Why `abort` was called; empty if it was not."""
         self.aborted_by = ""
         """Safety rule by which the vehicle aborted ("none": it was asked to); empty if it has not."""
+        self.spoiled_by = ""
+        """Why this flight must not be scored, however it ends; empty if there is no reason."""
         self._seq = secrets.randbits(16)
         self._policy_seq = secrets.randbits(31)
         self._offer: Offer | None = None
@@ -246,7 +248,7 @@ class Vehicle:
 
     def begin_flight(self) -> None:
         """Forget how the last flight was aborted, or called off, and a policy that was never confirmed."""
-        self.abort_reason = self.aborted_by = ""
+        self.abort_reason = self.aborted_by = self.spoiled_by = ""
         self._n_no_go = int(self._decision.values.get("ivl.n_no_go", 0))
         self._offer = None
 
@@ -255,6 +257,10 @@ class Vehicle:
         self.abort_reason = reason
         self.command = replace(self.command, request=Request.ABORT)
         self.send_command()
+
+    def spoil(self, reason: str) -> None:
+        """This flight must not be scored; the first reason is kept. From any thread."""
+        self.spoiled_by = self.spoiled_by or reason
 
     def come_down(self) -> None:
         """Land where it hovers after a flight that is over: its landing is that of an abort, but it is none.
@@ -419,6 +425,11 @@ class Vehicle:
         """The supervisor's bits, asked for now."""
         answer = self.session.ask(_PORT_SUPERVISOR, 0, b"\x0c", b"\x8c", "state of the supervisor")
         return Supervisor(int.from_bytes(answer[1:3], "little") & 0xFF)
+
+    @property
+    def seems_to_fly(self) -> bool:
+        """The same as `is_flying`, as the vehicle's log told last, without asking."""
+        return Supervisor.FLYING in Supervisor(int(self.watch.values.get("supervisor.info", 0)) & 0xFF)
 
     def is_flying(self) -> bool:
         """Whether the supervisor believes that it flies."""

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ivl import forms, native, yamlfile
+from ivl import files, forms, native, yamlfile
 from ivl.errors import ArgumentError, ConfigError
 from ivl.experiment import LearnerChoice
 from ivl.forms import Form
@@ -149,12 +149,10 @@ def save(policy: PolicyFile, path: Path) -> None:
     Raises:
         ConfigError: The file cannot be written.
     """
-    draft = path.with_name(f".{path.name}.part")
     try:
-        draft.write_text(_text(policy), encoding="utf-8")
-        draft.replace(path)
+        files.write(path, _text(policy))
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error}") from error
+        raise ConfigError(f"{path}: cannot be written: {files.reason(error)}") from error
 
 
 def _text(policy: PolicyFile) -> str:

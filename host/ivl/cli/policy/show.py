@@ -170,7 +170,7 @@ def _print_table(found: dict[str, Any]) -> None:
         for vz, row in zip(found["vz_mps"], found[name], strict=True):
             table.add_row(f"{vz:g}", *(f"{value:.{digits}f}" for value in row))
         console.out.print()
-        console.out.print(table)
+        console.out.print(table, soft_wrap=False)
 
 
 def _line(name: str, text: str) -> None:
