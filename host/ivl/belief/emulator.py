@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.special import expit  # type: ignore[import-untyped]
-from sklearn.neural_network import MLPClassifier  # type: ignore[import-untyped]
 
 from ivl.belief import recording
 from ivl.belief.bank import Bank
@@ -168,6 +167,8 @@ class LandingEmulator:
 
 def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> LandingEmulator:
     """Neural networks on the landings of a bank."""
+    from sklearn.neural_network import MLPClassifier  # type: ignore[import-untyped]  # takes a second to load
+
     n, m = bank.landed.shape
     flights = (
         np.repeat(bank.z, m, axis=0),
