@@ -56,7 +56,7 @@ def belief_of(
 class Even(emulator.LandingEmulator):
     """A landing emulator that knows nothing."""
 
-    def rate(self, z: np.ndarray, theta: np.ndarray, battery_V: np.ndarray) -> np.ndarray:  # noqa: ARG002
+    def rate(self, z: np.ndarray, theta: np.ndarray, conditions: np.ndarray) -> np.ndarray:  # noqa: ARG002
         return np.full(len(z), 0.5)
 
 
@@ -135,7 +135,7 @@ def test_a_bank_is_flown_once_and_its_name_says_what_it_depends_on(
 def test_the_emulators_predict_members_that_they_have_not_seen(kin: Family, simulator: Simulator) -> None:
     fresh = bank.make(kin, FLIGHT, 24, 12, seed=99)
     n = fresh.landed.size
-    flights = np.repeat(fresh.z, 12, axis=0), fresh.theta.reshape(n, -1), np.full(n, np.nan)
+    flights = np.repeat(fresh.z, 12, axis=0), fresh.theta.reshape(n, -1), np.full((n, 2), np.nan)
     seen = emulator.used(fresh.features).reshape(n, -1)
     error = seen - simulator.recordings.mean(*flights)
     pitch = emulator.USED.index("pitch_090")
@@ -163,8 +163,8 @@ def test_covariances_are_found_from_residuals_with_gaps() -> None:
 
 def linear(kin: Family, rng: np.random.Generator) -> emulator.RecordingEmulator:
     """Features that are linear in z, with known noise, whatever is flown."""
-    scale = emulator.Scale(BOUNDS[:, 0], BOUNDS[:, 1], 0.0, 1.0)
-    n_terms = emulator._terms(np.zeros((1, len(kin.dimensions))), np.zeros((1, 3))).shape[1]
+    scale = emulator.Scale(BOUNDS[:, 0], BOUNDS[:, 1], np.zeros(2), np.ones(2))
+    n_terms = emulator._terms(np.zeros((1, len(kin.dimensions))), np.zeros((1, 4))).shape[1]
     weights = np.zeros((n_terms, N_USED))
     weights[1 : 1 + len(kin.dimensions)] = rng.normal(size=(len(kin.dimensions), N_USED))
     return emulator.RecordingEmulator(scale, weights, 4.0 * np.eye(N_USED), 0.5 * np.eye(N_USED))
@@ -173,11 +173,11 @@ def linear(kin: Family, rng: np.random.Generator) -> emulator.RecordingEmulator:
 def evidence_of(emulated: emulator.RecordingEmulator, z: np.ndarray, n: int, rng: np.random.Generator) -> Evidence:
     """Recordings of a member of a linear family, with errors as the emulator says; half of them with a gap."""
     theta = rng.uniform(BOUNDS[:, 0], BOUNDS[:, 1], (n, 2))
-    mean = emulated.mean(np.tile(z, (n, 1)), theta, np.full(n, np.nan))
+    mean = emulated.mean(np.tile(z, (n, 1)), theta, np.full((n, 2), np.nan))
     shared = rng.multivariate_normal(np.zeros(N_USED), emulated.between)
     features = mean + shared + rng.multivariate_normal(np.zeros(N_USED), emulated.within, n)
     features[::2, -3:] = np.nan
-    return Evidence(theta, features, rng.random(n) < 0.5, np.full(n, np.nan))
+    return Evidence(theta, features, rng.random(n) < 0.5, np.full((n, 2), np.nan))
 
 
 def exact(emulated: emulator.RecordingEmulator, evidence: Evidence, n_z: int) -> tuple[np.ndarray, np.ndarray]:
@@ -198,7 +198,7 @@ def test_the_posterior_of_a_linear_family_is_the_known_one(kin: Family) -> None:
     believed._landings = Even(emulated, np.zeros(N_USED), np.ones(N_USED), [])
     whole = evidence_of(emulated, np.array([0.8, -1.1, 0.4]), 5, rng)
     for n in (2, 5):  # flight by flight, as it is used
-        part = Evidence(whole.theta[:n], whole.features[:n], whole.landed[:n], whole.battery_V[:n])
+        part = Evidence(whole.theta[:n], whole.features[:n], whole.landed[:n], whole.conditions[:n])
         believed.update(part)
     mean, covariance = exact(emulated, whole, n_z)
     assert np.allclose(believed.z.mean(axis=0), mean, atol=0.12)
@@ -248,7 +248,7 @@ def test_landings_tell_of_the_member(simulator: Simulator) -> None:
     theta = np.tile([4.5, 9.0], (n, 1))
     for landed in (True, False):
         told = simulator.belief(np.random.Generator(np.random.PCG64(7)), 300, Trust())
-        told.update(Evidence(theta, nothing, np.full(n, landed), np.full(n, np.nan)))
+        told.update(Evidence(theta, nothing, np.full(n, landed), np.full((n, 2), np.nan)))
         after = told.rates(np.array([[4.5, 9.0]])).mean()
         assert after > before if landed else after < before
 

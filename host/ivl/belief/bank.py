@@ -26,7 +26,7 @@ FloatArray = npt.NDArray[np.float64]
 
 Progress = Callable[[int, int], None]
 
-VERSION = 1
+VERSION = 3
 """Of what a bank is made of; a cached one of another version is not used."""
 SPREAD = 1.3
 _BROAD = 0.25

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import expit  # type: ignore[import-untyped]
+from scipy.special import expit, ndtri  # type: ignore[import-untyped]
 
 from ivl.belief import recording
 from ivl.belief.bank import Bank
@@ -24,7 +24,8 @@ FloatArray = npt.NDArray[np.float64]
 USED = tuple(
     name
     for name in recording.NAMES
-    if name in ("closing", "contact_time") or name.endswith(("_050", "_090", "_130", "_170", "_210"))
+    if name in ("closing", "contact_time", "contact_distance")
+    or name.endswith(("_050", "_090", "_130", "_170", "_210"))
 )
 """Features that are emulated; the others say the same again."""
 _USED_INDEX = np.array([recording.NAMES.index(name) for name in USED])
@@ -41,27 +42,39 @@ def used(features: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Scale:
-    """What is known of a flight, as numbers of size one: the policy, and the battery's voltage where there is one."""
+    """What is known of a flight, as numbers of size one: its policy and its conditions.
+
+    Attributes:
+        lo: Lower bounds of the policies, shape (dim,).
+        hi: Upper bounds, shape (dim,).
+        mean: Mean of the conditions, shape (2,); 0 of one that no flight has.
+        sigma: Their standard deviations, shape (2,); 1 of one that no flight has.
+    """
 
     lo: FloatArray
     hi: FloatArray
-    battery_V: float
-    battery_sigma_V: float
+    mean: FloatArray
+    sigma: FloatArray
 
     @staticmethod
     def of(bank: Bank, bounds: FloatArray) -> "Scale":
-        """Of a bank; without a battery its number is 0."""
-        volts = bank.features[..., recording.BATTERY]
-        seen = np.isfinite(volts)
-        if not seen.any():
-            return Scale(bounds[:, 0], bounds[:, 1], 0.0, 1.0)
-        return Scale(bounds[:, 0], bounds[:, 1], float(volts[seen].mean()), float(volts[seen].std()))
+        """The scale of a bank."""
+        given = bank.features[..., recording.CONDITIONS].reshape(-1, len(recording.CONDITIONS))
+        known = [column[np.isfinite(column)] for column in given.T]
+        mean = np.array([column.mean() if len(column) else 0.0 for column in known])
+        sigma = np.array([column.std() or 1.0 if len(column) else 1.0 for column in known])
+        return Scale(bounds[:, 0], bounds[:, 1], mean, sigma)
 
-    def __call__(self, theta: FloatArray, battery_V: FloatArray | None = None) -> FloatArray:
-        """Policies, shape (n, dim), with voltages, shape (n,), as shape (n, dim + 1); NaN: the mean voltage."""
-        battery = np.zeros(len(theta)) if battery_V is None else (battery_V - self.battery_V) / self.battery_sigma_V
+    def __call__(self, theta: FloatArray, conditions: FloatArray) -> FloatArray:
+        """Policies, shape (n, dim), with conditions, shape (n, 2), as shape (n, dim + 2); NaN is the mean."""
         policy = 4.0 * (theta - self.lo) / (self.hi - self.lo) - 2.0
-        return np.concatenate([policy, np.where(np.isfinite(battery), battery, 0.0)[:, None]], axis=1)
+        others = (conditions - self.mean) / self.sigma
+        return np.concatenate([policy, np.where(np.isfinite(others), others, 0.0)], axis=1)
+
+    def conditions(self, quantiles: FloatArray) -> FloatArray:
+        """Conditions, shape (n, 2), of quantiles, shape (n, 2): a normal voltage, a uniform overshoot."""
+        spread = np.stack([ndtri(quantiles[:, 0]), np.sqrt(3.0) * (2.0 * quantiles[:, 1] - 1.0)], axis=1)
+        return np.asarray(self.mean + self.sigma * spread)
 
 
 @dataclass(frozen=True)
@@ -79,9 +92,9 @@ class RecordingEmulator:
     within: FloatArray
     between: FloatArray
 
-    def mean(self, z: FloatArray, theta: FloatArray, battery_V: FloatArray) -> FloatArray:
+    def mean(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """Expected features of members z, shape (n, d), in flights, shape (n, ...): shape (n, n_used)."""
-        return _terms(z, self.scale(theta, battery_V)) @ self.weights
+        return _terms(z, self.scale(theta, conditions)) @ self.weights
 
 
 def _terms(z: FloatArray, s: FloatArray) -> FloatArray:
@@ -97,7 +110,7 @@ def fit_recordings(bank: Bank, scale: Scale) -> RecordingEmulator:
     z = np.repeat(bank.z, k, axis=0)
     theta = bank.theta[:, :k].reshape(n * k, -1)
     y = used(bank.features).reshape(n * k, -1)
-    x = _terms(z, scale(theta, bank.features[..., recording.BATTERY].reshape(n * k)))
+    x = _terms(z, scale(theta, bank.features[..., recording.CONDITIONS].reshape(n * k, -1)))
     weights = np.zeros((x.shape[1], y.shape[1]))
     for column in range(y.shape[1]):
         seen = np.isfinite(y[:, column])
@@ -145,15 +158,15 @@ class LandingEmulator:
     spread: FloatArray
     nets: Sequence[Sequence[tuple[FloatArray, FloatArray]]]
 
-    def inputs(self, z: FloatArray, theta: FloatArray, battery_V: FloatArray) -> FloatArray:
+    def inputs(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """Member, flight, and what it is expected to record: the motion decides the landing."""
-        s = self.recordings.scale(theta, battery_V)
-        expected = (self.recordings.mean(z, theta, battery_V) - self.centre) / self.spread
-        return np.concatenate([z, s, s[:, :-1] ** 2, expected], axis=1)
+        s = self.recordings.scale(theta, conditions)
+        expected = (self.recordings.mean(z, theta, conditions) - self.centre) / self.spread
+        return np.concatenate([z, s, s[:, : theta.shape[1]] ** 2, expected], axis=1)
 
-    def rate(self, z: FloatArray, theta: FloatArray, battery_V: FloatArray) -> FloatArray:
+    def rate(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """P(landed), shape (n,), of members z, shape (n, d), in flights, shape (n, ...)."""
-        u = self.inputs(z, theta, battery_V).astype(np.float32)
+        u = self.inputs(z, theta, conditions).astype(np.float32)
         total = np.zeros(len(u))
         for net in self.nets:
             h: npt.NDArray[Any] = u
@@ -173,7 +186,7 @@ def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> La
     flights = (
         np.repeat(bank.z, m, axis=0),
         bank.theta.reshape(n * m, -1),
-        bank.features[..., recording.BATTERY].reshape(n * m),
+        bank.features[..., recording.CONDITIONS].reshape(n * m, -1),
     )
     expected = recordings.mean(*flights)
     emulator = LandingEmulator(recordings, expected.mean(axis=0), expected.std(axis=0), [])

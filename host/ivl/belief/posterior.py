@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtri  # type: ignore[import-untyped]
 
 from ivl.belief.emulator import USED, LandingEmulator, RecordingEmulator
 from ivl.family import Family
@@ -31,11 +30,12 @@ FloatArray = npt.NDArray[np.float64]
 
 _SIZES = {"pitch": 4.0, "rate": 0.8, "fall": 0.005}
 _AT_S, _ALIKE_S = 0.2, 0.1
-_OTHERS = {"contact_time": 0.004, "closing": 0.03}
+_OTHERS = {"contact_time": 0.004, "contact_distance": 0.005, "closing": 0.03}
 _MOVES, _BETA_START, _BETA_MIN, _BETA_MAX, _ACCEPTED = 4, 0.4, 0.02, 0.8, 0.3
 _BETA_FACTORS = (0.3, 1.0, 1.7)
 _EFFECTIVE, _HALVINGS, _LEAST_STEP = 0.5, 20, 1e-3
 _SPARE = 8
+_GOLDEN, _TINY = 0.6180339887498949, 1e-6
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class Trust:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Flights: policies, shape (n, dim), recordings (n, n_used), landings (n,), voltages in the hover (n,)."""
+    """Flights: policies, shape (n, dim), recordings (n, n_used), landings (n,), conditions (n, 2)."""
 
     theta: FloatArray
     features: FloatArray
     landed: npt.NDArray[np.bool_]
-    battery_V: FloatArray
+    conditions: FloatArray
 
 
 def discrepancy(factor: float) -> FloatArray:
@@ -115,7 +115,7 @@ class Belief:
         if evidence is None:
             return np.zeros(len(z))
         n, n_z = len(evidence.theta), len(z)
-        flights = np.repeat(z, n, axis=0), np.tile(evidence.theta, (n_z, 1)), np.tile(evidence.battery_V, n_z)
+        flights = np.repeat(z, n, axis=0), np.tile(evidence.theta, (n_z, 1)), np.tile(evidence.conditions, (n_z, 1))
         mean = self._recordings.mean(*flights).reshape(n_z, n, -1)
         p = self._landings.rate(*flights).reshape(n_z, n)
         right = np.where(evidence.landed, p, 1.0 - p)
@@ -174,18 +174,20 @@ class Belief:
     def rates(self, theta: FloatArray) -> FloatArray:
         """Landing rate of policies, shape (m, dim), of each particle, shape (n_particles, m).
 
-        Each particle has another voltage of the battery, spread as in the bank.
+        Each particle flies under other conditions, spread as in the bank.
         """
-        n, scale = len(self.z), self._recordings.scale
-        battery = scale.battery_V + scale.battery_sigma_V * ndtri((np.arange(n) + 0.5) / n)
-        flights = np.repeat(self.z, len(theta), axis=0), np.tile(theta, (n, 1)), np.repeat(battery, len(theta))
+        n = len(self.z)
+        at = np.arange(n)
+        quantiles = np.stack([(at + 0.5) / n, (0.5 + at * _GOLDEN) % 1.0], axis=1)
+        conditions = np.repeat(self._recordings.scale.conditions(quantiles), len(theta), axis=0)
+        flights = np.repeat(self.z, len(theta), axis=0), np.tile(theta, (n, 1)), conditions
         return self._landings.rate(*flights).reshape(n, len(theta))
 
     def rate_of_one(self, theta: FloatArray) -> FloatArray:
-        """Landing rate of policies, shape (m, dim), each with one particle and one voltage: shape (m,)."""
-        scale, chosen = self._recordings.scale, self._rng.integers(len(self.z), size=len(theta))
-        battery = scale.battery_V + scale.battery_sigma_V * self._rng.standard_normal(len(theta))
-        return self._landings.rate(self.z[chosen], theta, battery)
+        """Landing rate of policies, shape (m, dim), each of one particle under drawn conditions: shape (m,)."""
+        chosen = self._rng.integers(len(self.z), size=len(theta))
+        conditions = self._recordings.scale.conditions(self._rng.uniform(_TINY, 1.0 - _TINY, (len(theta), 2)))
+        return self._landings.rate(self.z[chosen], theta, conditions)
 
     def state(self) -> dict[str, Any]:
         """Particles and step, plain data; the evidence is the learner's, the generator too."""

@@ -4,9 +4,13 @@
     at_contact            time after the trigger, pitch, rate and fall at the first contact
     closing               closing speed just before the trigger
     battery               battery voltage in the hover before the approach
+    overshoot             share by which RREV was above the policy's threshold when the trigger fired
+
+The last two are conditions of a flight and not its result.
 
 Pitch is the nose-up rotation since level (degrees), rate the nose-up rate of the gyro (rad/s, clipped where it clips),
-fall the sensed distance that was lost since the trigger (m). What a flight does not have is NaN: samples after the
+fall the distance that was lost since the trigger (m), contact_distance that at the first contact, as motion capture
+gives them: late, and interpolated between its poses. What a flight does not have is NaN: samples after the
 contact, all of them without a trigger.
 """
 
@@ -16,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ivl import forms
 from ivl.flight.motion import Flip
 from ivl.outcome import Outcomes
 from ivl.world import Trace, World
@@ -24,12 +29,14 @@ FloatArray = npt.NDArray[np.float64]
 
 TIMES_S = np.arange(0.03, 0.231, 0.02)
 SIGNALS = ("pitch", "rate", "fall")
-AT_CONTACT = ("contact_time", "contact_pitch", "contact_rate", "contact_fall")
+AT_CONTACT = ("contact_time", "contact_pitch", "contact_rate", "contact_distance")
 NAMES = (
-    *(f"{signal}_{round(1000 * t):03d}" for signal in SIGNALS for t in TIMES_S), *AT_CONTACT, "closing", "battery",
+    *(f"{signal}_{round(1000 * t):03d}" for signal in SIGNALS for t in TIMES_S), *AT_CONTACT, "closing",
+    "battery", "overshoot",
 )  # fmt: skip
 N = len(NAMES)
-BATTERY = NAMES.index("battery")
+CONDITIONS = np.array([NAMES.index("battery"), NAMES.index("overshoot")])
+"""Where the conditions stand among the features."""
 
 _CLOSING_BEFORE_S = 0.02
 _LAST_S = 0.24
@@ -37,6 +44,7 @@ _TRACE_PERIOD_S = 0.005
 _GYRO_FULL_RADPS = 34.9
 """Full scale of the gyro (Bosch BMI088 data sheet); rates are compared up to `_CLIP_SHARE` of it."""
 _CLIP_SHARE = 0.93
+_OVERSHOOT_MAX = 0.1
 _ATTITUDE_DEG, _CONTACT_S, _BATTERY_V = 0.3, 0.002, 0.01
 """Assumed errors of a recorded attitude, of the time of the first contact as a recorder at 500 Hz gives it, and of a
 voltage that was averaged over a hover."""
@@ -79,11 +87,12 @@ def simulated(world: World, flight: Flight, theta: FloatArray, seed: int, stream
         seed=seed, stream=stream, period_s=_TRACE_PERIOD_S,
     )  # fmt: skip
     rng = np.random.Generator(np.random.PCG64([seed, stream]))
-    return of_trace(world, trace, rng), np.atleast_1d(np.asarray(trace.outcome)).view(np.recarray)
+    threshold_per_s = float(theta[0]) if flight.form == forms.PAPER else 0.0
+    return of_trace(world, trace, threshold_per_s, rng), np.atleast_1d(np.asarray(trace.outcome)).view(np.recarray)
 
 
-def of_trace(world: World, trace: Trace, rng: np.random.Generator) -> FloatArray:
-    """Features of a simulated flight, shape (N,), with the noise of a recording."""
+def of_trace(world: World, trace: Trace, threshold_per_s: float, rng: np.random.Generator) -> FloatArray:
+    """Features of a simulated flight, shape (N,), with the noise of a recording; a threshold of 0 is unknown."""
     outcome, rows = trace.outcome, trace.rows
     if not outcome["triggered"]:
         return np.full(N, np.nan)
@@ -94,12 +103,15 @@ def of_trace(world: World, trace: Trace, rng: np.random.Generator) -> FloatArray
     pitch = np.rad2deg(np.unwrap(np.deg2rad(rows["pitch_deg"])))
     pitch = pitch - 360.0 * np.round(pitch[at] / 360.0) + rng.normal(0.0, _ATTITUDE_DEG, n)
     rate = -rows["w_B_radps"][:, 1] + rng.normal(0.0, max(sense["sense.gyro_noise"], 1e-3), n)
-    fall = rows["d_sensed_m"][at] - rows["d_sensed_m"]
+    late = np.interp(rows["t_s"] - sense["sense.latency"], rows["t_s"], rows["d_ceil_m"])
+    distance = late + sense["world.sensed_gap_offset"] + rng.normal(0.0, max(sense["sense.position_noise"], 1e-4), n)
     closing = -np.gradient(rows["d_ceil_m"], rows["t_s"]) + rng.normal(0.0, max(sense["sense.velocity_noise"], 1e-3), n)
     contact_s = float(outcome["t_impact_s"]) - float(outcome["t_trigger_s"]) + rng.normal(0.0, _CONTACT_S)
     has_battery = sense["battery.voltage"] > 0.0
     battery_V = float(rows["battery_V"][0]) + rng.normal(0.0, _BATTERY_V) if has_battery else np.nan
-    return _features(t_s, pitch, rate, fall, closing, contact_s, battery_V)
+    overshoot = float(outcome["rrev_trigger"]) / threshold_per_s - 1.0 if threshold_per_s > 0.0 else np.nan
+    crossed = abs(overshoot) < _OVERSHOOT_MAX  # else the approach began above the threshold
+    return _features(t_s, pitch, rate, distance, closing, contact_s, (battery_V, overshoot if crossed else np.nan))
 
 
 def of_flip(flip: Flip, h_plane_m: float) -> FloatArray:
@@ -110,29 +122,29 @@ def of_flip(flip: Flip, h_plane_m: float) -> FloatArray:
     pitch = np.concatenate([[pitch0], flip.pitch_deg])
     rate = np.concatenate([[-float(np.asarray(flip.state.w_B_radps)[1])], flip.rate_radps])
     closing = np.full(len(t_s), float(np.asarray(flip.state.v_W_mps)[2]))
-    return _features(t_s, pitch, rate, distance[0] - distance, closing, flip.t_contact_s, np.nan)
+    return _features(t_s, pitch, rate, distance, closing, flip.t_contact_s, (np.nan, np.nan))
 
 
 def _features(
     t_s: FloatArray,
     pitch: FloatArray,
     rate: FloatArray,
-    fall: FloatArray,
+    distance: FloatArray,
     closing: FloatArray,
     contact_s: float,
-    battery_V: float,
+    conditions: tuple[float, float],
 ) -> FloatArray:
     """Signals at the times of the features; NaN after the contact and after the end of the recording."""
     end_s = contact_s if np.isfinite(contact_s) else _LAST_S
     seen = min(end_s, float(t_s[-1])) >= TIMES_S
     clip = _CLIP_SHARE * _GYRO_FULL_RADPS
-    signals = (pitch, np.clip(rate, -clip, clip), fall)
+    signals = (pitch, np.clip(rate, -clip, clip), float(np.interp(0.0, t_s, distance)) - distance)
     at_times = [np.where(seen, np.interp(TIMES_S, t_s, signal), np.nan) for signal in signals]
     at_contact = np.full(len(AT_CONTACT), np.nan)
     if np.isfinite(contact_s) and contact_s <= t_s[-1]:
-        at_contact = np.array([contact_s, *(float(np.interp(contact_s, t_s, signal)) for signal in signals)])
+        at_contact = np.array([contact_s, *(float(np.interp(contact_s, t_s, s)) for s in (*signals[:2], distance))])
     before = float(np.interp(-_CLOSING_BEFORE_S, t_s, closing))
-    return np.concatenate([*at_times, at_contact, [before, battery_V]])
+    return np.concatenate([*at_times, at_contact, [before, *conditions]])
 
 
 def table(features: FloatArray) -> Mapping[str, float]:

@@ -53,7 +53,7 @@ class EpheBelief(EpheMemory):
         self._bounds = np.stack([self.lo, self.hi], axis=1)
         self._belief: Belief | None = None
         self._theta, self._features = np.empty((0, self.dim)), np.empty((0, len(emulator.USED)))
-        self._told, self._battery_V, self._foreseen = np.empty(0, dtype=bool), np.empty(0), np.empty(0)
+        self._told, self._conditions, self._foreseen = np.empty(0, dtype=bool), np.empty((0, 2)), np.empty(0)
 
     def begin(self, simulator: Simulator) -> None:
         """Start from simulated vehicles; before the first `ask` or `load_state_dict`."""
@@ -105,11 +105,11 @@ class EpheBelief(EpheMemory):
         self._foreseen = np.append(self._foreseen, decide.rate(self._belief, self._corrected, theta))
         self._theta = np.vstack([self._theta, theta])
         self._features = np.vstack([self._features, emulator.used(features)])
-        self._battery_V = np.append(self._battery_V, features[:, recording.BATTERY])
+        self._conditions = np.vstack([self._conditions, features[:, recording.CONDITIONS]])
         self._told = np.append(self._told, landed)
 
     def _evidence(self) -> Evidence:
-        return Evidence(self._theta, self._features, self._told, self._battery_V)
+        return Evidence(self._theta, self._features, self._told, self._conditions)
 
     def _imagine_on_belief(self, mu: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
         """EPHE from where it stands; from the belief's best policy where that is expected to land more often."""
@@ -141,7 +141,7 @@ class EpheBelief(EpheMemory):
             "belief": self._belief.state(),
             "theta": self._theta.tolist(),
             "features": _plain(self._features),
-            "battery_V": _plain(self._battery_V),
+            "conditions": _plain(self._conditions),
             "told": [int(value) for value in self._told],
             "foreseen": self._foreseen.tolist(),
             "choice": self._choice.tolist(),
@@ -159,7 +159,7 @@ class EpheBelief(EpheMemory):
         self._belief = belief
         self._theta = np.array(state["theta"], dtype=np.float64).reshape(-1, self.dim)
         self._features = np.array(state["features"], dtype=np.float64).reshape(-1, len(emulator.USED))
-        self._battery_V = np.array(state["battery_V"], dtype=np.float64)
+        self._conditions = np.array(state["conditions"], dtype=np.float64).reshape(-1, 2)
         self._told = np.array(state["told"], dtype=bool)
         self._foreseen = np.array(state["foreseen"], dtype=np.float64)
         self._choice = np.array(state["choice"], dtype=np.float64)
