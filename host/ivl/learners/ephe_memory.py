@@ -12,7 +12,8 @@ distribution N(mu, diag sigma^2) is fitted to rollouts imagined on that model. W
 
 (2) to (4) are EPHE with above-mean weights about the old mean (`ivl.learners.ephe`). They are repeated `iterations`
 times with sigma' for s, since imagined rollouts cost nothing: once from the present mu, once from the model's best
-policy, and the end of which the model expects more is kept. Before the next episode the same distribution imagines
+policy, and the end of which the model expects more is kept. If that is less than the mean return of all that was flown,
+the imagined rollouts have missed a peak that is narrow for their number; then mu is the best policy. Before the next episode the same distribution imagines
 rollouts once more. Each rollout that is flown is the best of them for its own draw f_n of the posterior:
 
     theta_n = argmax over the imagined theta_k of f_n                                                         (5)
@@ -66,6 +67,8 @@ class EpheMemory(BOLearner):
         super()._update(theta, rewards, meta)
         ends = [self._fitted(start, self._wide()) for start in (self._mu, self._best)]
         self._mu, self._sigma = max(ends, key=lambda end: self._worth(end[0][None])[0])
+        if self._worth(self._mu[None])[0] < 0.0 < self._worth(self._best[None])[0]:  # lost, as many dimensions allow
+            self._mu, self._sigma = self._best, self._wide()
 
     def _wide(self) -> FloatArray:
         """Spread that an episode begins with, s of the module's text."""
