@@ -13,8 +13,9 @@ distribution N(mu, diag sigma^2) is fitted to rollouts imagined on that model. W
 (2) to (4) are EPHE with above-mean weights about the old mean (`ivl.learners.ephe`). They are repeated `iterations`
 times with sigma' for s, since imagined rollouts cost nothing: once from the present mu, once from the model's best
 policy, and the end of which the model expects more is kept. If that is less than the mean return of all that was flown,
-the imagined rollouts have missed a peak that is narrow for their number; then mu is the best policy. Before the next episode the same distribution imagines
-rollouts once more. Each rollout that is flown is the best of them for its own draw f_n of the posterior:
+the imagined rollouts have missed a peak that is narrow for their number; then mu is the model's best policy. Before the
+next episode the same distribution imagines rollouts once more. Each rollout that is flown is the best of them for its
+own draw f_n of the posterior:
 
     theta_n = argmax over the imagined theta_k of f_n                                                         (5)
 
