@@ -10,7 +10,7 @@
 
 enum
 {
-    BLOCK = 32  // requests
+    BLOCK = 16  // requests
 };
 
 // reference manual RM0090, sections 7.3.13 and 18.4
