@@ -39,7 +39,7 @@ FILES = {
 }
 SIMULATED = ("ideal", "noise")
 GEAR_SETS = ("as_simulated", "table1")
-LEARNERS = ("ephe", "ephe_new", "ephe_robust", "cmaes", "cmaes_lr", "bo")
+LEARNERS = ("ephe", "ephe_new", "ephe_robust", "ephe_memory", "cmaes", "cmaes_lr", "bo")
 OTHER_LEARNERS = ("ephe_robust", "bo")
 OTHER_APPROACHES = ((2.0, 90.0), (3.0, 90.0), (2.5, 60.0))
 MAP_ROLLOUTS = 24

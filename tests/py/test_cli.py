@@ -113,7 +113,7 @@ def test_list_names_everything(capsys: Capture) -> None:
     assert {entry["name"] for entry in data["vehicles"]} == {"habas2021", "crazyflie21", "crazyflie21_brushless"}
     assert len(data["gears"]) == 12
     assert "experiments/paper_vertical.yaml" in {entry["name"] for entry in data["experiments"]}
-    assert {"ephe", "ephe_robust", "cmaes", "bo"} <= {entry["name"] for entry in data["learners"]}
+    assert {"ephe", "ephe_robust", "ephe_memory", "cmaes", "bo"} <= {entry["name"] for entry in data["learners"]}
     assert {entry["name"] for entry in data["rewards"]} == {"paper", "authors_code"}
     forms = {entry["name"]: entry["parameters"] for entry in data["forms"]}
     assert set(forms) == {"constant", "polynomial2", "polynomial3", "bilinear"}

@@ -102,7 +102,7 @@ def test_equal_seeds_give_equal_files_and_others_do_not(learned: PolicyFile) -> 
     assert learn(tiny_experiment(seed=1)).values != learned.values
 
 
-@pytest.mark.parametrize("learner", ["ephe", "ephe_robust", "bo"])
+@pytest.mark.parametrize("learner", ["ephe", "ephe_robust", "ephe_memory", "bo"])
 def test_any_learner_searches(learner: str, learned: PolicyFile) -> None:
     found = learn(tiny_experiment(learner={"name": learner}))
     assert found.training is not None

@@ -67,13 +67,10 @@ class EPHE(Learner):
     def _update(self, theta: FloatArray, rewards: FloatArray, _meta: Meta, /) -> None:
         options = self.options
         best = np.argsort(-rewards, kind="stable")[: options.n_best]
-        weights = _weights(rewards, options.weight)[best]
-        total = weights.sum()
+        weights = (above_mean(rewards) if options.weight == "above_mean" else rewards)[best]
         if not weights.any():
             return
-        mu = weights @ theta[best] / total  # (1)
-        center = mu if options.sigma_ref == "new" else self._mu
-        sigma = np.sqrt(weights @ (theta[best] - center) ** 2 / total)  # (2)
+        mu, sigma = most_likely(theta[best], weights, None if options.sigma_ref == "new" else self._mu)
         sigma = np.maximum(sigma, np.maximum(options.shrink_min * self._sigma, options.sigma_floor))  # (5)
         # neither line acts on policies that were drawn here, but others may have been told
         self._mu = np.clip(mu, self.lo, self.hi)
@@ -98,10 +95,18 @@ class RobustEPHE(EPHE):
     Options: ClassVar[type[Options]] = RobustOptions
 
 
-def _weights(rewards: FloatArray, kind: str) -> FloatArray:
-    """Equation (3) or (4)."""
-    if kind == "return":
-        return rewards
+def most_likely(theta: FloatArray, weights: FloatArray, center: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+    """Equations (1) and (2): mean and spread, shape (dim,) each, of weighted policies, shape (n, dim).
+
+    `center` is c of equation (2); None: the new mean. At least one weight is above 0.
+    """
+    total = weights.sum()
+    mu = weights @ theta / total
+    return mu, np.sqrt(weights @ (theta - (mu if center is None else center)) ** 2 / total)
+
+
+def above_mean(rewards: FloatArray) -> FloatArray:
+    """Weights of equation (4) over all rollouts, shape (n,)."""
     if np.ptp(rewards) == 0:  # rounding of the mean must not make weights of equal returns
         return np.zeros(len(rewards))
     return np.asarray(np.maximum(0.0, rewards - rewards.mean()))
