@@ -21,7 +21,7 @@ from ivl.outcome import clean, four_leg
 from ivl.policy import assess, file, general, learn
 from ivl.policy.assess import Assessment
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Family, Place, PolicyTask, fly
+from ivl.policy.flying import Drawn, Place, PolicyTask, fly
 from ivl.policy.flying import score as score_of
 from ivl.policy.region import BOX, PLANE, Approaches, Series
 from ivl.policy.shape import General, is_general
@@ -288,11 +288,11 @@ def family(bench: Bench) -> Data:
         policies = {
             "nominal": bench.learned(*LONG, *FLOWN, f"gear={gear}"),
             "family": bench.learned(
-                *LONG, *QUICK[:3], *FLOWN, f"gear={gear}", f"family.n_vehicles={N_FAMILY}", "family.seed=1",
+                *LONG, *QUICK[:3], *FLOWN, f"gear={gear}", f"drawn.n_vehicles={N_FAMILY}", "drawn.seed=1",
                 "search.n_approaches=17", "search.n_select=67",
             ),
         }  # fmt: skip
-        drawn = Family(n_vehicles=N_DRAWN, seed=SEED)
+        drawn = Drawn(n_vehicles=N_DRAWN, seed=SEED)
         places = Place.of(policies["nominal"].tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
         approaches = Series([BOX], SEED, Purpose.ASSESS).next(100)
         row: Data = {}

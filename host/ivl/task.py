@@ -15,6 +15,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from ivl import model, native
+from ivl.errors import ConfigError
+from ivl.family import FamilyChoice
 from ivl.sensing import APPROACHES, ESTIMATORS, approach_settings, estimator_settings
 from ivl.settings import Finite, Setting, Strict
 from ivl.world import World
@@ -52,6 +54,9 @@ class Setup(Strict):
         default="imparted", description="At the approach velocity, from hover, or at the trigger."
     )
     overrides: dict[str, Setting] = Field(default_factory=dict, description="Parameters of the world that differ.")
+    family: FamilyChoice = Field(
+        default=FamilyChoice(), description="What is uncertain of all that, beside the sigma of the files."
+    )
 
     @model_validator(mode="after")
     def _one_word_for_each(self) -> Self:
@@ -63,6 +68,14 @@ class Setup(Strict):
                 field = "estimator" if name in estimator_settings(self.estimator) else "approach"
                 said_by = f"{field} {getattr(self, field)!r}"
                 raise ValueError(f"overrides.{name}: {override.value:g} contradicts {said_by}, which says {value:g}")
+        return self
+
+    @model_validator(mode="after")
+    def _family_is_possible(self) -> Self:
+        try:
+            self.family.check()
+        except ConfigError as error:
+            raise ValueError(str(error)) from error
         return self
 
     def world_settings(self) -> dict[str, float]:

@@ -79,11 +79,15 @@ class Chosen:
             apply_setting(data, setting, Task, _LABEL)
         return data | self.given
 
+    def setup(self, base: BaseModel | None = None) -> tuple[Setup, str]:
+        """Set-up and landing gear, for commands that need no approach; `base` as for `fields`."""
+        data = self.fields(base)
+        given = {name: value for name, value in data.items() if name in Setup.model_fields}
+        return yamlfile.validate(Setup, given, _LABEL), str(data["gear"])
+
     def make_world(self, base: BaseModel | None = None) -> World:
         """The world alone, for commands that are told the approach by somebody else; `base` as for `fields`."""
-        data = self.fields(base)
-        gear = str(data["gear"])
-        setup = yamlfile.validate(Setup, {n: v for n, v in data.items() if n in Setup.model_fields}, _LABEL)
+        setup, gear = self.setup(base)
         return setup.world_of(gear)
 
 

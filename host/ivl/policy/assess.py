@@ -16,7 +16,7 @@ from ivl.analysis.intervals import Estimate, share_of, wilson
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import go
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Family, Place, PolicyTask, fly
+from ivl.policy.flying import Drawn, Place, PolicyTask, fly
 from ivl.policy.region import BOX, PLANE, Approaches, Region, Series
 from ivl.policy.shape import FloatArray, General, is_general
 from ivl.seeds import Purpose
@@ -121,7 +121,7 @@ def assess(
     n_approaches: int = 2000,
     seed: int = 0,
     threads: int | None = None,
-    family: Family | None = None,
+    family: Drawn | None = None,
 ) -> Assessment:
     """Judge a policy.
 
@@ -158,7 +158,7 @@ def fresh(region: Region, n: int, seed: int) -> Approaches:
     return Series([region], seed, Purpose.ASSESS).next(n)
 
 
-def _places(tasks: Sequence[PolicyTask], family: Family | None) -> list[Place]:
+def _places(tasks: Sequence[PolicyTask], family: Drawn | None) -> list[Place]:
     places = [Place.of(task) for task in tasks]
     if family is None:
         return places
