@@ -32,6 +32,10 @@ from ivl.world import World
 
 FloatArray = npt.NDArray[np.float64]
 
+MEMBER = "family.member"
+"""Path of the member that a task flies."""
+MEMBERS_MAX = 10_000
+"""Members that a task can name."""
 _TRIES = 1000
 _LEAST_EIGENVALUE = 1e-6
 _OVERRIDE = "override"  # origin of such a value, see `ivl.model.Parameters`
@@ -86,6 +90,13 @@ class FamilyChoice(Strict):
     correlations: list[Correlation] = Field(default_factory=list)
     scale: Finite = Field(
         default=1.0, gt=0, le=10, description="factor on all of x; one that is log-uniform stays between its bounds"
+    )
+    seed: int = Field(default=0, ge=0, lt=2**63, description="of the members")
+    member: int | None = Field(
+        default=None,
+        ge=0,
+        lt=MEMBERS_MAX,
+        description="flies in place of the vehicle of the files; null: that one",
     )
 
     def check(self) -> None:
@@ -243,7 +254,7 @@ class Family:
         return Sample(z, [world for _, world, _ in drawn], sum(refused for _, _, refused in drawn))
 
     def _draw(self, rng: np.random.Generator) -> tuple[FloatArray, World, int]:
-        """z and world of one member, and how many the library refused before."""
+        """Z and world of one member, and how many the library refused before."""
         refused: NativeError | None = None
         for n_refused in range(_TRIES):
             z = self._draw_inside(rng)
@@ -304,6 +315,15 @@ def of(world: World, choice: FamilyChoice | None = None) -> Family:
 def members(world: World, n: int, seed: int, choice: FamilyChoice | None = None) -> list[World]:
     """The first n members of a seed; more members of the same seed begin with the same ones."""
     return of(world, choice).sample(n, seed).worlds
+
+
+def chosen_member(world: World, choice: FamilyChoice) -> World:
+    """What a task flies: the member that its section names, or the vehicle of the files if it names none.
+
+    Raises:
+        ConfigError: As `of` and `Family.sample`.
+    """
+    return world if choice.member is None else of(world, choice).sample(choice.member + 1, choice.seed).worlds[-1]
 
 
 def _is_known(name: str, known: Sequence[str]) -> bool:

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from ivl import model, native
 from ivl.errors import ConfigError
-from ivl.family import FamilyChoice
+from ivl.family import FamilyChoice, chosen_member
 from ivl.sensing import APPROACHES, ESTIMATORS, approach_settings, estimator_settings
 from ivl.settings import Finite, Setting, Strict
 from ivl.world import World
@@ -84,7 +84,11 @@ class Setup(Strict):
         return {**approach_settings(self.approach), **estimator_settings(self.estimator), **overrides}
 
     def world_of(self, gear: str) -> World:
-        """The world of this set-up with one landing gear."""
+        """The world of this set-up with one landing gear; that of a member if the family names one."""
+        return chosen_member(self.nominal_world_of(gear), self.family)
+
+    def nominal_world_of(self, gear: str) -> World:
+        """The world of the files and overrides, whichever member flies."""
         return World(self.vehicle, gear, self.gear_set, self.sensing, **self.world_settings())
 
     def setup(self) -> dict[str, Any]:

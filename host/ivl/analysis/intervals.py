@@ -114,3 +114,9 @@ def difference(first: Estimate, second: Estimate) -> Estimate:
     half = np.hypot(sides[0], sides[1])
     value = first.value - second.value
     return Estimate(value, value - float(half), value + float(half), min(first.n, second.n))
+
+
+def worst_tenth(rates: npt.ArrayLike) -> float:
+    """Mean over the tenth of the vehicles with the lowest rates, over one at least; rates of shape (n,)."""
+    rising = np.sort(np.asarray(rates, dtype=np.float64))
+    return float(rising[: -(-rising.size // 10)].mean())

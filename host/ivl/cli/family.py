@@ -20,6 +20,10 @@ Examples:
       the parameters that are drawn, and how
   ivl family show experiments/transfer.yaml --members 100
       a hundred vehicles of it
+  ivl rollout --experiment experiments/transfer.yaml --rrev 4 --moment 8 --set family.member=3
+      a landing with one of them, no. 3; every command that takes --set can fly it
+  ivl map sweeps/map.yaml --set vehicle=crazyflie21 --set gear_set=table1 --family 20
+      where twenty of them land (ivl sweep takes --family, too)
 """
 
 SHOW_HELP = """Show which parameters of a family are drawn, around what and how far, and where that is known from.
@@ -38,6 +42,8 @@ and replaces it:
     correlations:
       - {of: [rotor.tau_up, rotor.tau_down], value: 0.8, source: "the same motors"}
     scale: 1.0                                              factor on all spreads
+    seed: 0                                                 of the members
+    member: null                                            fly this one, 0 or more; null: the vehicle of the files
 
 A parameter that --set gives a value is known, and is not drawn.
 
@@ -55,7 +61,6 @@ Examples:
       all values, for a script
 """
 
-_MEMBERS_MAX = 100_000
 _SHOWN_MAX = 5  # members whose values people see
 
 app = typer.Typer(help=HELP, rich_markup_mode=None, no_args_is_help=True)
@@ -66,8 +71,8 @@ app = typer.Typer(help=HELP, rich_markup_mode=None, no_args_is_help=True)
 def show(
     chosen: Chosen,
     path: Annotated[str | None, typer.Argument(metavar="[EXPERIMENT]", help="As --experiment.")] = None,
-    members: Annotated[int, typer.Option(help="Draw so many vehicles.", min=0, max=_MEMBERS_MAX)] = 0,
-    seed: Annotated[int | None, typer.Option(help="Seed of the drawn vehicles.  [default: 0]", min=0)] = None,
+    members: Annotated[int, typer.Option(help="Draw so many vehicles.", min=0, max=family.MEMBERS_MAX)] = 0,
+    seed: Annotated[int | None, typer.Option(help="Seed of the drawn vehicles; default: family.seed.", min=0)] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Show a family; SHOW_HELP is the text that people see."""
@@ -76,10 +81,11 @@ def show(
     if seed is not None and not members:
         raise ConfigError("--seed: is for --members")
     setup, gear = replace(chosen, path=path or chosen.path).setup()
-    kin = family.of(setup.world_of(gear), setup.family)
-    sample = kin.sample(members, seed or 0) if members else None
+    kin = family.of(setup.nominal_world_of(gear), setup.family)
+    seed = setup.family.seed if seed is None else seed
+    sample = kin.sample(members, seed) if members else None
     if as_json:
-        console.print_json(_data(kin, setup.family, sample, seed or 0))
+        console.print_json(_data(kin, setup.family, sample, seed))
         return
     _print(kin, setup.family)
     if sample is not None:
@@ -137,7 +143,7 @@ def _print_sample(kin: Family, sample: Sample) -> None:
     _say("")
     _say(f"{n} drawn; the library refused {sample.n_refused} others ({console.percent(sample.share_refused)})")
     first = range(min(n, _SHOWN_MAX))
-    columns = ["mean", "deviation", "least", "most", *(f"no. {i + 1}" for i in first)]
+    columns = ["mean", "deviation", "least", "most", *(f"no. {i}" for i in first)]
     _say(f"{'parameter':26s} {' '.join(f'{column:>10s}' for column in columns)} unit")
     for d, drawn in zip(kin.dimensions, values.T, strict=True):
         numbers = [drawn.mean(), drawn.std(), drawn.min(), drawn.max(), *drawn[: len(first)]]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ivl.analysis.intervals import Estimate, share_of, wilson
+from ivl.analysis.intervals import Estimate, share_of, wilson, worst_tenth
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import go
 from ivl.policy.file import PolicyFile
@@ -183,8 +183,7 @@ def _rates_of_vehicles(flown: Sequence[Outcomes]) -> Rates:
     """Flights of one vehicle are alike, so the vehicles count for the intervals, not the flights."""
     shares = np.array([[rate(outcomes).mean() for outcomes in flown] for rate in (four_leg, clean)])
     landed, spotless = (_mean_over_vehicles(of) for of in shares)
-    worst = np.sort(shares[0])[: -(-shares.shape[1] // 10)]
-    return Rates(landed, spotless, float(worst.mean()), sum(outcomes.size for outcomes in flown))
+    return Rates(landed, spotless, worst_tenth(shares[0]), sum(outcomes.size for outcomes in flown))
 
 
 def _mean_over_vehicles(shares: FloatArray) -> Estimate:
