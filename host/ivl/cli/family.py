@@ -127,11 +127,11 @@ def _print(kin: Family, choice: FamilyChoice) -> None:
     _say(f"vehicle {world.vehicle}, gear {world.gear_set}/{world.gear}{sensing}: {len(kin.names)} parameters are drawn")
     if kin.scale != 1.0:
         _say(f"all spreads are {kin.scale:g} times those of the files and of the section")
-    _say(f"{'parameter':26s} {'centre':>10s}  {'spread':>12s} {'unit':8s} {'bounds':24s} source")
+    _say(f"{'parameter':26s} {'centre':>10s}  {'spread':>12s} {'unit':10s} {'bounds':24s} source")
     for d in kin.dimensions:
         spread = "log-uniform" if d.is_log else f"+- {kin.scale * d.sigma:.4g}"
         bounds = f"{d.lo:g} .. {d.hi:g}"
-        _say(f"{d.name:26s} {d.centre:10.4g}  {spread:>12s} {d.unit:8s} {bounds:24s} {d.source}")
+        _say(f"{d.name:26s} {d.centre:10.4g}  {spread:>12s} {d.unit:10s} {bounds:24s} {d.source}")
     for c in choice.correlations:
         if set(c.of) <= set(kin.names):
             _say(f"correlation of {' and '.join(c.of)}: {c.value:g} ({c.source})")
