@@ -191,7 +191,11 @@ test-links: setup-dev build ## flying over a link: the same bits as in process, 
 	@$(BIN)/python -m pytest tests/links $(PYTEST_ARGS)
 
 .PHONY: reliability
-reliability: setup-dev build ## learn over links that lose, delay, freeze and restart; writes docs/RELIABILITY.md (15 min)
+reliability: setup-dev build ## damaged files, failing disks, links that lose and restart; writes docs/RELIABILITY.md (30 min)
+	@mkdir -p build/borders
+	@$(CC) -std=c11 -O1 -Wall -Wextra -Werror -shared -fPIC -o build/borders/faulty_io.so tools/faulty_io.c -ldl
+	@LD_PRELOAD=$(CURDIR)/build/borders/faulty_io.so IVL_FAULTY_IO=$(CURDIR)/build/borders/faulty_io.so \
+	    $(BIN)/python tools/borders.py
 	@$(BIN)/python tools/reliability.py
 
 # which C tests know of forms; the image of the chip is that of `ivl learn --uri pil://`

@@ -97,7 +97,7 @@
     X(rrev, max, per_s, "1/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
     X(rrev, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
     X(range, rate, hz, "Hz", 0.0, 500.0, 0.0, "ranging sensor along b_z: samples per second; 0: there is none") \
-    X(range, delay, s, "s", 0.0, 0.06, 0.0, "from the sampling instant to the arrival") \
+    X(range, delay, s, "s", 0.0, 0.12, 0.0, "from the sampling instant to the arrival") \
     X(range, noise, m, "m", 0.0, 1.0, 0.0, "standard deviation of a sample") \
     X(range, bias, m, "m", 0.0, 1.0, 0.0, "standard deviation of the offset, drawn once a rollout") \
     X(range, resolution, m, "m", 0.0, 0.1, 0.0, "values are multiples of this; 0: not rounded") \

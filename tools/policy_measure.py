@@ -16,12 +16,13 @@ import numpy.typing as npt
 import policy_oneclass
 
 from ivl import forms as policy_forms
-from ivl.analysis.intervals import Z95, share_of
+from ivl import native
+from ivl.analysis.intervals import share_of, student95
 from ivl.outcome import clean, four_leg
 from ivl.policy import assess, file, general, learn
 from ivl.policy.assess import Assessment
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Drawn, Place, PolicyTask, fly
+from ivl.policy.flying import Drawn, Place, PolicyTask, fly, fly_own
 from ivl.policy.flying import score as score_of
 from ivl.policy.region import BOX, PLANE, Approaches, Series
 from ivl.policy.shape import General, is_general
@@ -39,10 +40,10 @@ QUICK = (
 """A small budget, for gears, forms and families."""
 OVER_BOX = ("regions=[box]", "search.n_approaches=60", "search.n_select=200")
 LONG = (
-    "regions=[box]", "search.n_iterations=30", "search.n_approaches=100", "search.n_select=400", "go.n_approaches=100",
+    "regions=[box]", "search.n_iterations=40", "search.n_approaches=100", "search.n_select=400", "go.n_approaches=100",
     "go.n_held_out=100",
 )  # fmt: skip
-"""Five times as many flights over the box, for what is hard to land."""
+"""Six times as many flights over the box, for what is hard to land."""
 ON = (
     "map.n_speeds=4", "map.n_angles=4", "map.n_thresholds=20", "map.moments_norm=[0.9]", "search.n_iterations=8",
     "search.n_approaches=50", "search.spread_per_s=0.15", "search.n_select=300", "go.n_approaches=100",
@@ -61,7 +62,12 @@ HARD = ("wide_long",)
 OTHER_FORMS = (("polynomial2", "wide_long"), ("bilinear", "wide_long"))
 FLOWN = ("vehicle=crazyflie21", "gear_set=table1")
 FORMS = ("polynomial2", "polynomial3", "bilinear")
-N_FAMILY, N_DRAWN = 6, 20
+FAMILY_ON = (
+    "regions=[box]", *ON[:4], "search.n_iterations=40", "search.spread_per_s=0.2", "go.n_approaches=100",
+    "go.n_held_out=100",
+)  # fmt: skip
+"""The search on from the policy of the nominal vehicle, with it or with drawn ones."""
+N_FAMILY, N_DRAWN, N_EACH = 24, 40, 100
 N_ONE_CLASS = 1000
 Data = dict[str, Any]
 FloatArray = npt.NDArray[np.float64]
@@ -69,7 +75,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Bench:
-    """Where policies are kept, and what is told of the progress."""
+    """Where policies are kept, and who hears of the progress."""
 
     folder: Path
     say: Callable[[str], None]
@@ -78,7 +84,8 @@ class Bench:
     def learned(self, *settings: str, start: PolicyFile | None = None) -> PolicyFile:
         """The policy of the shipped experiment with some settings; learned once."""
         chosen = general.load([EXPERIMENT], settings)
-        text = json.dumps([chosen.model_dump(mode="json"), start.digest if start else None], sort_keys=True)
+        made_by = native.library().digest()
+        text = json.dumps([chosen.model_dump(mode="json"), start.digest if start else None, made_by], sort_keys=True)
         path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.yaml"
         if not path.exists():
             self.say(f"learning: {' '.join(settings) or EXPERIMENT}")
@@ -100,7 +107,7 @@ def about(policy: PolicyFile) -> Data:
     return {
         "form": policy.form,
         "theta": policy.values,
-        "crc": f"{policy.crc:08x}",
+        "crc": f"{policy.checksum:08x}",
         "flights": training.rollouts if training else None,
     }
 
@@ -119,30 +126,16 @@ def sensors(bench: Bench) -> Data:
 def go_no_go(bench: Bench) -> Data:
     """The default policy with a go / no-go that was learned with a camera, over the plane."""
     policy = bench.learned(*GO_ALONE, *SENSORS["camera50"], start=bench.learned())
-    return {"camera50": {**about(policy), **bench.judged(policy).as_dict(), "contacts": contacts(bench, policy)}}
+    judged = bench.judged(policy)
+    return {"camera50": {**about(policy), **judged.as_dict(), "clearance_m": clearance_m(bench, policy)}}
 
 
-def contacts(bench: Bench, policy: PolicyFile) -> Data:
-    """When the refused approaches of `assess` touched the ceiling: before they were called off, or in the level-out."""
+def clearance_m(bench: Bench, policy: PolicyFile) -> float:
+    """Least distance from the ceiling of the refused approaches of `assess` that touched nothing."""
     place = Place.of(policy.tasks[0])
-    approaches = Series([PLANE], SEED, Purpose.ASSESS).next(N_APPROACHES)
+    approaches = assess.fresh(PLANE, N_APPROACHES, SEED)
     (flown,) = fly([place], policy.form, np.array(policy.values), approaches, bench.threads)
-    touched = np.flatnonzero((flown["no_go"] == 1) & np.isfinite(flown["t_impact_s"]))
-    phases = []
-    for i in touched:
-        rows = place.world.trace(
-            float(approaches.speed_mps[i]), float(approaches.angle_deg[i]), *policy.values, form=policy.form,
-            seed=approaches.seed, stream=int(approaches.stream[i]), start=place.task.start,
-        ).rows  # fmt: skip
-        before = rows["phase"][rows["t_s"] < flown["t_impact_s"][i]]
-        phases.append(place.world.phase_name(int(before[-1])))
-    refused = flown["no_go"] == 1
-    return {
-        "before": phases.count("approach"),
-        "in_level_out": len(phases) - phases.count("approach"),
-        "refused": int(refused.sum()),
-        "clearance_m": float(np.sort(flown["d_min_m"][refused & ~np.isfinite(flown["t_impact_s"])])[0]),
-    }
+    return float(np.min(flown["d_min_m"][(flown["no_go"] == 1) & ~np.isfinite(flown["t_impact_s"])]))
 
 
 @dataclass(frozen=True)
@@ -198,13 +191,9 @@ def ceiling(bench: Bench, task: PolicyTask, cells: Cells) -> tuple[FloatArray, A
 
 def _fly_cells(place: Place, policies: FloatArray, approaches: Approaches, threads: int | None) -> Any:
     """Outcomes (policies, cells, n) of policies (policies, cells, 2) that belong to a cell each."""
-    n_cells = policies.shape[1]
-    shape = (n_cells, len(approaches) // n_cells)
-    speed, angle, stream = (a.reshape(shape) for a in (approaches.speed_mps, approaches.angle_deg, approaches.stream))
-    rrev, moment = policies[..., 0, None], policies[..., 1, None]
-    return place.world.rollouts(
-        speed, angle, rrev, moment, seed=approaches.seed, stream=stream, start=place.task.start, threads=threads
-    )
+    n = len(approaches) // policies.shape[1]
+    (flown,) = fly_own([place], "constant", np.repeat(policies, n, axis=1), approaches, threads)
+    return flown.reshape(*policies.shape[:2], n)
 
 
 def beside_ceiling(bench: Bench, policy: PolicyFile, cells: Cells | None = None) -> Data:
@@ -281,39 +270,43 @@ def _constant(bench: Bench, chosen: general.GeneralExperiment) -> Data:
 
 
 def family(bench: Bench) -> Data:
-    """A policy of the nominal vehicle beside one of six drawn vehicles, on twenty drawn anew."""
+    """A policy of the nominal vehicle beside one of drawn vehicles, searched on from the same start."""
     found: Data = {}
-    shares = {}
     for gear in ("wide_long",):
+        begin = bench.learned(*LONG, *FLOWN, f"gear={gear}")
+        over_drawn = (f"drawn.n_vehicles={N_FAMILY}", "drawn.seed=1")
         policies = {
-            "nominal": bench.learned(*LONG, *FLOWN, f"gear={gear}"),
+            "nominal": bench.learned(*FAMILY_ON, *FLOWN, f"gear={gear}", *_shared_by(1), start=begin),
             "family": bench.learned(
-                *LONG, *QUICK[:3], *FLOWN, f"gear={gear}", f"drawn.n_vehicles={N_FAMILY}", "drawn.seed=1",
-                "search.n_approaches=17", "search.n_select=67",
+                *FAMILY_ON, *FLOWN, f"gear={gear}", *over_drawn, *_shared_by(N_FAMILY), start=begin
             ),
         }  # fmt: skip
         drawn = Drawn(n_vehicles=N_DRAWN, seed=SEED)
-        places = Place.of(policies["nominal"].tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
-        approaches = Series([BOX], SEED, Purpose.ASSESS).next(100)
-        row: Data = {}
+        places = Place.of(begin.tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
+        batches = Series([BOX], SEED, Purpose.ASSESS).for_each(len(places), N_EACH)
+        row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY}
+        landed: dict[str, FloatArray] = {}
         for name, policy in policies.items():
             bench.say(f"{N_DRAWN} vehicles, {gear}: {name}")
-            flown = fly(places, policy.form, General(policy.form).always_go(policy.values), approaches, bench.threads)
-            shares[name] = np.array([[four_leg(o).mean(), clean(o).mean()] for o in flown])
-            landed = np.sort(shares[name][:, 0])
+            flown = fly(places, policy.form, General(policy.form).always_go(policy.values), batches, bench.threads)
+            landed[name] = np.array([four_leg(o).mean() for o in flown])
             row[name] = {
                 **about(policy),
-                "landed": float(landed.mean()),
-                "clean": float(shares[name][:, 1].mean()),
-                "worst_tenth": float(landed[: -(-N_DRAWN // 10)].mean()),
+                "landed": float(landed[name].mean()),
+                "clean": float(np.mean([clean(o).mean() for o in flown])),
+                "worst_tenth": float(np.sort(landed[name])[: -(-N_DRAWN // 10)].mean()),
                 "nominal_box": over(bench, policy, "box")["box"],
             }
-        gain = shares["family"][:, 0] - shares["nominal"][:, 0]
-        half = float(Z95 * gain.std(ddof=1) / np.sqrt(gain.size))
+        gain = landed["family"] - landed["nominal"]
+        half = float(student95(gain.size - 1) * gain.std(ddof=1) / np.sqrt(gain.size))
         row["gain"] = {"landed": float(gain.mean()), "half": half, "better": int((gain > 0).sum())}
-        row["vehicles"], row["flights"] = N_DRAWN, len(approaches)
         found[f"crazyflie21, table1, {gear}"] = row
     return found
+
+
+def _shared_by(n_vehicles: int) -> tuple[str, str]:
+    """The approaches of an iteration, and those of the choice, divided among vehicles."""
+    return f"search.n_approaches={192 // n_vehicles}", f"search.n_select={1200 // n_vehicles}"
 
 
 def one_class(bench: Bench) -> Data:

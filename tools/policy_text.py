@@ -101,8 +101,7 @@ def _go(found: Data) -> list[str]:
         least = name == "strikes_avoided"
         met = verdict(go[name], asked, *go[f"{name}_interval"], least)
         rows.append((title, f"{'>=' if least else '<='} {_rate(asked)}", _with(go, name), met))
-    touched = camera["contacts"]
-    n = touched["in_level_out"]
+    n = go["level_out_contacts"]
     rows.append(("contacts in level-outs", "0", str(n), "yes" if n == 0 else f"no, by {n}"))
     return [
         "### Go / no-go",
@@ -115,11 +114,9 @@ def _go(found: Data) -> list[str]:
         ),
         table(("", "asked", "measured", "met"), rows),
         _paragraph(
-            f"Of the {touched['refused']} refused approaches {touched['before']} touched the ceiling before",
-            "they were called off",
-            "(without a distance there is no cue, and without a cue nothing is decided); the least",
-            "clearance of those that",
-            f"touched nothing was {100 * touched['clearance_m']:.1f} cm.",
+            f"Of the refused approaches {go['contacts_before_no_go']} touched the ceiling before they were called off",
+            "(without a distance there is no cue, and without a cue nothing is decided); the least clearance of those",
+            f"that touched nothing was {100 * camera['clearance_m']:.1f} cm.",
         ),
     ]
 
@@ -155,7 +152,8 @@ def _gears(found: Data) -> list[str]:
 def _family(found: Data) -> list[str]:
     rows, gains = [], []
     for name, row in found.items():
-        for which, title in (("nominal", "the vehicle of the files"), ("family", "six drawn vehicles")):
+        drawn = f"{row['learned_over']} drawn vehicles"
+        for which, title in (("nominal", "the vehicle of the files"), ("family", drawn)):
             of = row[which]
             rows.append((name, title, _pair(of), _rate(of["worst_tenth"]), _pair(of["nominal_box"])))
         gain = row["gain"]
@@ -174,10 +172,9 @@ def _family(found: Data) -> list[str]:
         _paragraph(
             "Only the files of the vehicles that fly, and those of Table I, say",
             "how uncertain their numbers are (`sigma`), so",
-            "this is `crazyflie21`. One policy was learned for the vehicle of the",
-            "files, one for six vehicles drawn from",
-            "them, with as many flights in the search. Both are judged over the box on the same",
-            f"{first['vehicles']} vehicles drawn anew, {first['flights']}",
+            "this is `crazyflie21`. One policy was learned for the vehicle of the files, and one for",
+            f"{first['learned_over']} vehicles drawn from them, with as many flights in the search. Both are judged",
+            f"over the box on the same {first['vehicles']} vehicles drawn anew, {first['flights']}",
             "approaches each, landed / clean. The flight core of a",
             "drawn vehicle knows the mass, inertia and thrust of that vehicle.",
         ),

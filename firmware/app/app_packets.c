@@ -168,7 +168,7 @@ static void tell_config(app_t *app, app_config_result_t result)
     {
         const char *name = ivl_cfg_name(result.bad);
         DEBUG_PRINT("Configuration %lu refused (%d): %s\n", (unsigned long)result.seq, result.status, (name != NULL) ? name : "not now");
-        app->staged = app->cfg;
+        app_config_take_back(app);
     }
     const ivl_wire_config_echo_t echo = {result.seq, result.status, result.bad, app->config_crc};
     uint8_t                      bytes[IVL_WIRE_SIZE_MAX];

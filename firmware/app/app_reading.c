@@ -3,9 +3,8 @@
 #include "app_convert.h"
 #include "app_ivl.h"
 
-// no sensor sends longer after its sampling instant; with ivl.rrev_delay, and the ticks until it is taken, the core must still remember it
+// no sensor sends longer after its sampling instant; the core remembers that and the longest ivl.rrev_delay
 static const float AGE_S_MAX = 0.06f;
-static const float AGE_TICKS_MAX = (float)(IVL_HISTORY_TICKS - 4u);
 
 // the core's own limit of a flow
 static const float FLOW_RADPS_MAX = 100.0f;
@@ -19,7 +18,6 @@ static bool is_good(const ivl_cfg_t *cfg, const ivl_wire_reading_t *packet)
     const bool    has_rrev = (packet->valid & (uint8_t)IVL_WIRE_VALID_RREV) != 0u;
     const bool    has_flow = (packet->valid & (uint8_t)IVL_WIRE_VALID_FLOW) != 0u;
     return (packet->valid <= known) && (packet->age_s >= 0.0f) && (packet->age_s <= AGE_S_MAX) &&
-           ((packet->age_s + cfg->rrev_delay_s) * cfg->tick_hz <= AGE_TICKS_MAX) &&
            (!has_rrev || ivl_within(packet->rrev_per_s, cfg->rrev_per_s_max)) &&
            (!has_flow || ivl_within(packet->of_y_radps, FLOW_RADPS_MAX));
 }

@@ -1,5 +1,7 @@
 /// @file app_vars.c
 /// Parameters and logs of the core, from the tables of ivl_vars.h.  Writes go to a staged copy, which ivl.commit puts in force as a whole.
+#include <string.h>
+
 #include "app_convert.h"
 #include "app_ivl.h"
 #include "log.h"
@@ -45,6 +47,30 @@ app_config_result_t app_config_apply(app_t *app, const app_config_request_t *req
         app->configured = app->configured || (status == IVL_OK);
     }
     return (app_config_result_t){request->seq, (int8_t)status, (bad < 0) ? (uint8_t)APP_CONFIG_NONE : (uint8_t)bad};
+}
+
+/// Each row has a setter of its type by its own name; comparing bytes also finds what is no number.
+static void take_back_float(const char *name, const float *staged, float in_force)
+{
+    if (memcmp(staged, &in_force, sizeof in_force) != 0)
+    {
+        paramSetFloat(paramGetVarId("ivl", name), in_force);
+    }
+}
+
+static void take_back_uint8_t(const char *name, const uint8_t *staged, uint8_t in_force)
+{
+    if (*staged != in_force)
+    {
+        paramSetInt(paramGetVarId("ivl", name), in_force);
+    }
+}
+
+#define TAKE_BACK(ctype, group, row_name, field, unit, min, max, dflt, doc) take_back_##ctype(row_name, &app->staged.field, app->cfg.field);
+
+void app_config_take_back(app_t *app)
+{
+    IVL_PARAMS(TAKE_BACK)
 }
 
 // runs in the PARAM task, after the write of ivl.commit; a commit that is still waiting is not overwritten

@@ -9,35 +9,34 @@
 #define ROW(ctype, group, name, field, unit, min, max, dflt, doc)     ROW_##field,
 #define RANGE(ctype, group, name, field, unit, min, max, dflt, doc)   {(float)(min), (float)(max)},
 #define DEFAULT(ctype, group, name, field, unit, min, max, dflt, doc) .field = (ctype)(dflt),
-#define PLACE(ctype, group, name, field, unit, min, max, dflt, doc)   {offsetof(ivl_cfg_t, field), sizeof(ctype)},
+#define SIZE(ctype, group, name, field, unit, min, max, dflt, doc)    sizeof(ctype),
 
 enum
 {
     IVL_PARAMS(ROW) ROW_COUNT
 };
 
-// a member of one byte is a uint8_t, one of four a float; both numbers in two bytes
-typedef struct
-{
-    uint16_t offset : 13;
-    uint16_t size : 3;
-} place_t;
-
 typedef struct
 {
     float min, max;
 } range_t;
 
-static const place_t PLACES[] = {IVL_PARAMS(PLACE)};
+// a member of one byte is a uint8_t, one of four a float
+static const uint8_t SIZES[] = {IVL_PARAMS(SIZE)};
 static const range_t RANGES[] = {IVL_PARAMS(RANGE)};
 
 static const ivl_cfg_t DEFAULTS = {IVL_PARAMS(DEFAULT)};
 
-static float get(const ivl_cfg_t *cfg, int row)
+// where a member of this size stands that follows those up to `end`: at the next multiple of its size
+static const uint8_t *next(const uint8_t *end, size_t size)
 {
-    const uint8_t *at = (const uint8_t *)cfg + PLACES[row].offset;
-    float          value = (float)*at;
-    if (PLACES[row].size == sizeof value)
+    return end + (size - (uintptr_t)end % size) % size;
+}
+
+static float get(const uint8_t *at, size_t size)
+{
+    float value = (float)*at;
+    if (size == sizeof value)
     {
         memcpy(&value, at, sizeof value);
     }
@@ -51,10 +50,12 @@ void ivl_cfg_defaults(ivl_cfg_t *cfg)
 
 static int bad_range(const ivl_cfg_t *cfg)
 {
-    for (int row = 0; row < (int)ROW_COUNT; row++)
+    const uint8_t *at = (const uint8_t *)cfg;
+    for (int row = 0; row < (int)ROW_COUNT; at += SIZES[row], row++)
     {
+        at = next(at, SIZES[row]);
         // in positive form, so that NaN is refused
-        const float value = get(cfg, row);
+        const float value = get(at, SIZES[row]);
         if (!((value >= RANGES[row].min) && (value <= RANGES[row].max)))
         {
             return row;
@@ -63,38 +64,31 @@ static int bad_range(const ivl_cfg_t *cfg)
     return -1;
 }
 
-static int bad_fence(const ivl_cfg_t *cfg)
+// pairs of which the first has to be less than the second; the first is the one that is named
+#define PAIR(lo, hi) {offsetof(ivl_cfg_t, lo), offsetof(ivl_cfg_t, hi), ROW_##lo}
+static const struct
 {
-    if (!(cfg->fence_x_m_min < cfg->fence_x_m_max))
-    {
-        return ROW_fence_x_m_min;
-    }
-    if (!(cfg->fence_y_m_min < cfg->fence_y_m_max))
-    {
-        return ROW_fence_y_m_min;
-    }
-    return (cfg->fence_z_m_min < cfg->fence_z_m_max) ? -1 : ROW_fence_z_m_min;
-}
+    uint16_t lo, hi;
+    uint8_t  row;
+} PAIRS[] = {
+    PAIR(d_ceil_m_min, d_ceil_m_max),   PAIR(speed_mps_min, speed_mps_max), PAIR(fence_x_m_min, fence_x_m_max),
+    PAIR(fence_y_m_min, fence_y_m_max), PAIR(fence_z_m_min, fence_z_m_max),
+};
 
 // members that have to fit each other
 static int bad_match(const ivl_cfg_t *cfg)
 {
-    if (!(cfg->d_ceil_m_min < cfg->d_ceil_m_max))
+    const uint8_t *members = (const uint8_t *)cfg;
+    for (size_t i = 0; i < sizeof PAIRS / sizeof PAIRS[0]; i++)
     {
-        return ROW_d_ceil_m_min;
-    }
-    if (!(cfg->speed_mps_min < cfg->speed_mps_max))
-    {
-        return ROW_speed_mps_min;
+        if (!(get(members + PAIRS[i].lo, sizeof(float)) < get(members + PAIRS[i].hi, sizeof(float))))
+        {
+            return PAIRS[i].row;
+        }
     }
     if (!(4.0f * cfg->motor_thrust_N_max > cfg->mass_kg * cfg->gravity_mps2))
     {
         return ROW_motor_thrust_N_max;
-    }
-    const int fence = bad_fence(cfg);
-    if (fence >= 0)
-    {
-        return fence;
     }
     return ivl_pwm_curve_good(cfg) ? -1 : ROW_pwm_c_gf;
 }
@@ -112,10 +106,12 @@ ivl_status_t ivl_cfg_check(const ivl_cfg_t *cfg)
 
 uint32_t ivl_cfg_crc(const ivl_cfg_t *cfg)
 {
-    uint32_t crc = 0;
-    for (int row = 0; row < (int)ROW_COUNT; row++)
+    const uint8_t *at = (const uint8_t *)cfg;
+    uint32_t       crc = 0;
+    for (int row = 0; row < (int)ROW_COUNT; at += SIZES[row], row++)
     {
-        crc = ivl_wire_crc(crc, (const uint8_t *)cfg + PLACES[row].offset, PLACES[row].size);
+        at = next(at, SIZES[row]);
+        crc = ivl_wire_crc(crc, at, SIZES[row]);
     }
     return crc;
 }

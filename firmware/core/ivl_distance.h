@@ -20,9 +20,8 @@ typedef struct
 {
     bool          running;
     bool          measured;  ///< this tick has looked at a measurement
-    ivl_history_t history;
-    ivl_motion_t  motion;   ///< history's integrals at the instant of the estimate
-    float         since_s;  ///< from that instant to this tick
+    ivl_motion_t  motion;    ///< history's integrals at the instant of the estimate
+    float         since_s;   ///< from that instant to this tick
     ivl_filter_t  filter;
     ivl_formula_t formula;
     float         range_d_m;  ///< source RANGE: distance at the instant of the estimate
@@ -32,6 +31,7 @@ typedef struct
     uint32_t      n_taken;  ///< measurements taken since the start
     uint32_t      n_gated;  ///< refused as too far off
     uint32_t      n_gated_run;
+    ivl_history_t history;
 } ivl_distance_t;
 
 /// True if the distance is that of the present tick, false if it is that of the last sample.

@@ -6,8 +6,6 @@
 
 // ---- conditions: pure questions about this tick.  Written in positive form and negated, so that a NaN counts as the bad case.
 
-typedef bool (*condition_t)(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen);
-
 #define CONDITION(name) static bool name(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 #define UNUSED(x)       ((void)(x))
 
@@ -19,6 +17,12 @@ static bool elapsed(const ivl_state_t *state, float limit_s)
 static bool inside(float x, float lo, float hi)
 {
     return (x >= lo) && (x <= hi);
+}
+
+CONDITION(never)
+{
+    UNUSED(cfg), UNUSED(state), UNUSED(seen);
+    return false;
 }
 
 CONDITION(not_configured)
@@ -223,84 +227,72 @@ CONDITION(would_not_land)
 #define SCORED   false
 
 // clang-format off
-/// X(with, id of IVL_RULE_, name, phases, condition, act of IVL_ACT_, discards), in the order of ivl_rule_t; `with` is handed on
-#define RULES(X, with) \
-    X(with, NONE,          "none",          0u,            NULL,               NONE,   DISCARDS)  \
+/// X(id of IVL_RULE_, name, phases, condition, act of IVL_ACT_, discards), in the order of ivl_rule_t
+#define RULES(X) \
+    X(NONE,          "none",          0u,            never,              NONE,   DISCARDS)  \
     /* to arm */                                                                                  \
-    X(with, CONFIG,        "config",        IDLE,          not_configured,     REFUSE, DISCARDS)  \
-    X(with, BYPASS,        "bypass",        IDLE,          motors_bypassed,    REFUSE, DISCARDS)  \
-    X(with, REARM,         "rearm",         IDLE,          not_rearmed,        REFUSE, DISCARDS)  \
-    X(with, BATTERY_REST,  "battery_rest",  IDLE,          battery_below_rest, REFUSE, DISCARDS)  \
+    X(CONFIG,        "config",        IDLE,          not_configured,     REFUSE, DISCARDS)  \
+    X(BYPASS,        "bypass",        IDLE,          motors_bypassed,    REFUSE, DISCARDS)  \
+    X(REARM,         "rearm",         IDLE,          not_rearmed,        REFUSE, DISCARDS)  \
+    X(BATTERY_REST,  "battery_rest",  IDLE,          battery_below_rest, REFUSE, DISCARDS)  \
     /* before the trigger: refuses to arm, later aborts */                                        \
-    X(with, STATE,         "state",         BEFORE,        state_old,          ABORT,  DISCARDS)  \
-    X(with, TILT,          "tilt",          BEFORE,        tipped_over,        ABORT,  SCORED)    \
-    X(with, COMMAND,       "command",       BEFORE,        command_old,        ABORT,  DISCARDS)  \
-    X(with, SUPERVISOR,    "supervisor",    BEFORE,        may_not_fly,        ABORT,  DISCARDS)  \
-    X(with, LINK,          "link",          BEFORE,        link_down,          ABORT,  DISCARDS)  \
-    X(with, SETPOINT,      "setpoint",      BEFORE,        setpoint_old,       ABORT,  DISCARDS)  \
-    X(with, HOST,          "host",          BEFORE,        host_silent,        ABORT,  DISCARDS)  \
-    X(with, BATTERY,       "battery",       BEFORE,        battery_below,      ABORT,  DISCARDS)  \
-    X(with, FENCE,         "fence",         BEFORE,        outside_fence,      ABORT,  SCORED)    \
-    X(with, SPEED,         "speed",         BEFORE,        too_fast,           ABORT,  SCORED)    \
-    X(with, UNCERTAIN,     "uncertain",     BEFORE,        position_uncertain, ABORT,  DISCARDS)  \
-    X(with, TOO_CLOSE,     "too_close",     APPROACH,      too_close,          ABORT,  SCORED)    \
-    X(with, APPROACH_TIME, "approach_time", APPROACH,      approach_too_long,  ABORT,  SCORED)    \
-    X(with, LEVEL_OUT_TIME, "level_out_time", LEVEL,       level_out_too_long, ABORT,  SCORED)    \
+    X(STATE,         "state",         BEFORE,        state_old,          ABORT,  DISCARDS)  \
+    X(TILT,          "tilt",          BEFORE,        tipped_over,        ABORT,  SCORED)    \
+    X(COMMAND,       "command",       BEFORE,        command_old,        ABORT,  DISCARDS)  \
+    X(SUPERVISOR,    "supervisor",    BEFORE,        may_not_fly,        ABORT,  DISCARDS)  \
+    X(LINK,          "link",          BEFORE,        link_down,          ABORT,  DISCARDS)  \
+    X(SETPOINT,      "setpoint",      BEFORE,        setpoint_old,       ABORT,  DISCARDS)  \
+    X(HOST,          "host",          BEFORE,        host_silent,        ABORT,  DISCARDS)  \
+    X(BATTERY,       "battery",       BEFORE,        battery_below,      ABORT,  DISCARDS)  \
+    X(FENCE,         "fence",         BEFORE,        outside_fence,      ABORT,  SCORED)    \
+    X(SPEED,         "speed",         BEFORE,        too_fast,           ABORT,  SCORED)    \
+    X(UNCERTAIN,     "uncertain",     BEFORE,        position_uncertain, ABORT,  DISCARDS)  \
+    X(TOO_CLOSE,     "too_close",     APPROACH,      too_close,          ABORT,  SCORED)    \
+    X(APPROACH_TIME, "approach_time", APPROACH,      approach_too_long,  ABORT,  SCORED)    \
+    X(LEVEL_OUT_TIME, "level_out_time", LEVEL,       level_out_too_long, ABORT,  SCORED)    \
     /* after the trigger: nothing but contact, loss of all senses and the clock ends a flip */    \
-    X(with, CONTACT,       "contact",       FLIP | COAST,  contact,            ATTACH, SCORED)    \
-    X(with, HANG,          "hang",          FLIP | COAST,  hanging,            ATTACH, SCORED)    \
-    X(with, BLIND,         "blind",         FLIP,          inputs_lost,        CUT,    SCORED)    \
-    X(with, FLIP_TIME,     "flip_time",     FLIP,          flip_too_long,      CUT,    SCORED)    \
-    X(with, COAST_TIME,    "coast_time",    COAST,         coast_over,         CUT,    SCORED)    \
+    X(CONTACT,       "contact",       FLIP | COAST,  contact,            ATTACH, SCORED)    \
+    X(HANG,          "hang",          FLIP | COAST,  hanging,            ATTACH, SCORED)    \
+    X(BLIND,         "blind",         FLIP,          inputs_lost,        CUT,    SCORED)    \
+    X(FLIP_TIME,     "flip_time",     FLIP,          flip_too_long,      CUT,    SCORED)    \
+    X(COAST_TIME,    "coast_time",    COAST,         coast_over,         CUT,    SCORED)    \
     /* after an abort */                                                                          \
-    X(with, LOST,          "lost",          ABORTED,       unable_to_hover,    CUT,    SCORED)    \
-    X(with, LANDED,        "landed",        ABORTED,       landed,             CUT,    SCORED)    \
+    X(LOST,          "lost",          ABORTED,       unable_to_hover,    CUT,    SCORED)    \
+    X(LANDED,        "landed",        ABORTED,       landed,             CUT,    SCORED)    \
     /* the trigger */                                                                             \
-    X(with, NO_POLICY,     "no_policy",     APPROACH,      no_policy,          HOLD,   DISCARDS)  \
-    X(with, ONE_SHOT,      "one_shot",      APPROACH,      has_triggered,      HOLD,   SCORED)    \
-    /* the policy expects no landing, at the trigger or at the last moment; a command that is not fresh does not hold it up */ \
-    X(with, NO_GO,         "no_go",         APPROACH,      would_not_land,     LEVEL,  SCORED)    \
-    X(with, NOT_FRESH,     "not_fresh",     APPROACH,      not_this_tick,      HOLD,   SCORED)    \
-    X(with, CUE,           "cue",           APPROACH,      cue_invalid,        HOLD,   SCORED)
+    X(NO_POLICY,     "no_policy",     APPROACH,      no_policy,          HOLD,   DISCARDS)  \
+    X(ONE_SHOT,      "one_shot",      APPROACH,      has_triggered,      HOLD,   SCORED)    \
+    /* the policy expects no landing, or there is no cue at the last moment; a command that is not fresh does not hold it up */ \
+    X(NO_GO,         "no_go",         APPROACH,      would_not_land,     LEVEL,  SCORED)    \
+    X(NOT_FRESH,     "not_fresh",     APPROACH,      not_this_tick,      HOLD,   SCORED)    \
+    X(CUE,           "cue",           APPROACH,      cue_invalid,        HOLD,   SCORED)
 // clang-format on
 
-// packed into two words
 typedef struct
 {
-    condition_t when;
-    uint16_t    phases;  // bits
-    uint8_t     act;     // ivl_act_t
-    bool        discards;
+    uint16_t phases;  // bits
+    uint8_t  act;     // ivl_act_t
+    bool     discards;
 } row_t;
 
-#define ROW(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = {when, phases, IVL_ACT_##act, discards},
-static const row_t ROWS[] = {RULES(ROW, )};
+#define ROW(id, name, phases, when, act, discards) [IVL_RULE_##id] = {phases, IVL_ACT_##act, discards},
+static const row_t ROWS[] = {RULES(ROW)};
 
 _Static_assert(sizeof ROWS / sizeof ROWS[0] == (size_t)IVL_RULE_COUNT, "one row a rule");
 _Static_assert(IVL_RULE_COUNT <= 255, "a rule is logged in one byte");
+_Static_assert(IVL_PHASE_COUNT <= 16, "a row has one bit a phase");
 
-// bits of the rows that name a phase: the others need no look
-#define BIT_IF(with, id, name, phases, when, act, discards) | ((((phases) & (with)) != 0u) ? 1u << IVL_RULE_##id : 0u)
-#define ROWS_OF(phase)                                      [phase] = 0u RULES(BIT_IF, 1u << (phase))
-static const uint32_t OF_PHASE[] = {
-    ROWS_OF(IVL_PHASE_IDLE), ROWS_OF(IVL_PHASE_READY),   ROWS_OF(IVL_PHASE_APPROACH),
-    ROWS_OF(IVL_PHASE_FLIP), ROWS_OF(IVL_PHASE_COAST),   ROWS_OF(IVL_PHASE_ATTACHED),
-    ROWS_OF(IVL_PHASE_DONE), ROWS_OF(IVL_PHASE_ABORTED), ROWS_OF(IVL_PHASE_LEVEL_OUT),
-};
-_Static_assert(sizeof OF_PHASE / sizeof OF_PHASE[0] == (size_t)IVL_PHASE_COUNT, "one entry a phase");
-_Static_assert(IVL_RULE_COUNT <= 32, "one bit a rule");
+// a chain of questions, not a loop over the table: the conditions are then part of this function, and none is called through a pointer
+#define ASK(id, name, phases, when, act, discards)                                                                                         \
+    if ((((phases) & phase) != 0u) && when(cfg, state, seen))                                                                              \
+    {                                                                                                                                      \
+        return IVL_RULE_##id;                                                                                                              \
+    }
 
 ivl_rule_t ivl_guard_find(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
 {
-    for (uint32_t left = OF_PHASE[state->phase]; left != 0u; left &= left - 1u)
-    {
-        // the lowest bit that is left
-        const int i = __builtin_ctz(left);
-        if (ROWS[i].when(cfg, state, seen))
-        {
-            return (ivl_rule_t)i;
-        }
-    }
+    const uint32_t phase = 1u << state->phase;
+    RULES(ASK)
     return IVL_RULE_NONE;
 }
 
@@ -325,8 +317,8 @@ bool ivl_guard_applies(ivl_rule_t rule, ivl_phase_t phase)
 }
 
 #ifndef IVL_NO_TEXT
-#define NAME(with, id, name, phases, when, act, discards) [IVL_RULE_##id] = (name),
-static const char *const NAMES[] = {RULES(NAME, )};
+#define NAME(id, name, phases, when, act, discards) [IVL_RULE_##id] = (name),
+static const char *const NAMES[] = {RULES(NAME)};
 
 const char *ivl_guard_name(ivl_rule_t rule)
 {

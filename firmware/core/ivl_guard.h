@@ -11,7 +11,7 @@ typedef enum
 {
     IVL_ACT_NONE,
     IVL_ACT_REFUSE,  ///< stay in IDLE
-    IVL_ACT_ABORT,   ///< level hover, then landing
+    IVL_ACT_ABORT,   ///< level-out if it is in an approach, level hover, then landing
     IVL_ACT_ATTACH,  ///< motors off: contact or hanging was sensed
     IVL_ACT_CUT,     ///< motors off
     IVL_ACT_HOLD,    ///< the trigger does not fire in this tick

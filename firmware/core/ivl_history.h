@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define IVL_HISTORY_TICKS 32u  ///< a power of two: 62 ms at 500 Hz
+#define IVL_HISTORY_TICKS 128u  ///< a power of two: 126 ms at 1 kHz, so that no delay that is allowed is forgotten
 
 /// Integrals of the acceleration since the start.
 typedef struct
@@ -16,9 +16,9 @@ typedef struct
 
 typedef struct
 {
-    ivl_motion_t at[IVL_HISTORY_TICKS];  ///< tick n in at[n modulo its size]
     uint32_t     n;                      ///< last tick, 0 at the start
     float        a_mps2;                 ///< of the last tick
+    ivl_motion_t at[IVL_HISTORY_TICKS];  ///< tick n in at[n modulo its size]; last, so that offsets of the others stay short
 } ivl_history_t;
 
 /// Both integrals are 0 now.

@@ -3,7 +3,7 @@
 
 #include "ivl_math.h"
 
-// the vehicle hovers at least this far below its highest point, and descends there at this speed
+// the vehicle hovers at least this far below its highest point and above the lower fence, and descends there at this speed
 static const float DROP_M = 0.25f;
 static const float DESCENT_MPS = 1.0f;
 
@@ -17,41 +17,48 @@ float ivl_level_out_rise_m(const ivl_cfg_t *cfg, float v_close_mps, float thrust
         return 0.0f;
     }
     const float kept_mps2 = IVL_LIFT_NORM_MIN * cfg->gravity_mps2;
-    const float brake_mps2 = cfg->gravity_mps2 - kept_mps2;
-    // the thrust that fades with motor_lag adds this much speed, and adds it late
+    const float twice_brake_mps2 = 2.0f * (cfg->gravity_mps2 - kept_mps2);
+    // the thrust that fades with motor_lag adds this much speed, and adds it late; a slow vehicle turns before that
     const float more_mps = ivl_clamp(thrust_mps2 - kept_mps2, 0.0f, thrust_mps2) * cfg->motor_lag_s;
-    const float v_mps = v_close_mps + more_mps;
-    const float rise_m = 0.5f * v_mps * v_mps / brake_mps2 - more_mps * cfg->motor_lag_s;
-    // a vehicle so slow that it turns before the thrust has faded
-    const float least_m = 0.5f * v_close_mps * v_close_mps / brake_mps2;
-    return (rise_m > least_m) ? rise_m : least_m;
+    const float late_mps = 2.0f * v_close_mps + more_mps - twice_brake_mps2 * cfg->motor_lag_s;
+    return (v_close_mps * v_close_mps + more_mps * ((late_mps > 0.0f) ? late_mps : 0.0f)) / twice_brake_mps2;
 }
 
-bool ivl_level_out_is_last(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
+void ivl_level_out_prepare(ivl_state_t *state)
 {
-    const float v_mps = seen->cues.rrev_per_s * seen->ceiling.d_ceil_m;
-    const float thrust_mps2 = cfg->gravity_mps2 + state->approach.accel_mps2 * state->approach.dir_z;
-    // what is seen may be old and uncertain, and the motors act after the next tick
-    const float late_s = state->derived.dt_s + (ivl_distance_is_present(cfg) ? 0.0f : seen->ceiling.age_s);
-    const float room_m = seen->ceiling.d_ceil_m - SURE_SIGMAS * seen->ceiling.d_sigma_m - cfg->d_touch_m - cfg->level_margin_m;
-    return !(room_m > ivl_level_out_rise_m(cfg, v_mps, thrust_mps2) + v_mps * late_s);
+    state->level = (ivl_level_t){.rises = true, .z_W_m = state->sense.sample.p_WB_m.z};
+    state->decision = (ivl_decision_t){.room_m = IVL_SENSE_P_M_MAX};
 }
 
-bool ivl_level_out_asked(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen)
+void ivl_level_out_ask(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen)
 {
+    ivl_decision_t      *decision = &state->decision;
+    const ivl_ceiling_t *ceiling = &seen->ceiling;
+    const float          dt_s = state->derived.dt_s, a_mps2 = state->approach.accel_mps2 * state->approach.dir_z;
+    if (seen->cues.valid)
+    {
+        // what is seen may be old, and the motors act after the next tick
+        const float late_s = dt_s + (ivl_distance_is_present(cfg) ? 0.0f : ceiling->age_s);
+        decision->v_close_mps = ceiling->v_close_mps;
+        decision->room_m = ceiling->d_ceil_m - ceiling->v_close_mps * late_s - cfg->d_touch_m - cfg->level_margin_m;
+        decision->sure_m = SURE_SIGMAS * ceiling->d_sigma_m;
+    }
+    else
+    {
+        decision->room_m -= decision->v_close_mps * dt_s;
+        decision->v_close_mps += a_mps2 * dt_s;
+    }
+    const float v_mps = decision->v_close_mps;
+    const float left_m = decision->room_m - ivl_level_out_rise_m(cfg, v_mps, cfg->gravity_mps2 + a_mps2);
+    const bool  is_last = !(left_m > decision->sure_m);
+    // there may be a way back, or there is nothing to flip by
+    const bool is_open = !decision->made || (left_m > 0.0f) || !seen->cues.valid;
     // a policy says nothing while the ceiling does not come closer
-    const bool closing = seen->cues.rrev_per_s > 0.0f;
-    return closing && !state->decision.made && (state->action.flip || ivl_level_out_is_last(cfg, state, seen));
-}
-
-void ivl_level_out_begin(ivl_state_t *state)
-{
-    // p_hold is still where the approach began
-    state->level = (ivl_level_t){.rises = true, .z_W_m = state->p_hold_W_m.z};
+    decision->asked = (v_mps > 0.0f) && is_open && (state->action.flip || is_last);
 }
 
 // the highest point: from here along the ceiling with what speed there is, until it is braked away
-static void turn(ivl_state_t *state)
+static void turn(const ivl_cfg_t *cfg, ivl_state_t *state)
 {
     const ivl_sample_t *sample = &state->sense.sample;
     ivl_level_t        *level = &state->level;
@@ -59,8 +66,9 @@ static void turn(ivl_state_t *state)
     level->vx_mps = sample->v_WB_mps.x;
     level->vy_mps = sample->v_WB_mps.y;
     state->p_hold_W_m = sample->p_WB_m;
-    const float z_most_m = sample->p_WB_m.z - DROP_M;
-    level->z_W_m = (level->z_W_m < z_most_m) ? level->z_W_m : z_most_m;
+    // where there is not room for both, in the middle between highest point and fence
+    const float z_m = sample->p_WB_m.z, half_m = 0.5f * (z_m - cfg->fence_z_m_min), off_m = (half_m < DROP_M) ? half_m : DROP_M;
+    level->z_W_m = ivl_clamp(level->z_W_m, cfg->fence_z_m_min + off_m, z_m - off_m);
 }
 
 // no error of position or velocity is left to the controller: it keeps the vehicle level, with the least thrust that it has
@@ -103,7 +111,7 @@ ivl_reference_t ivl_level_out_next(const ivl_cfg_t *cfg, ivl_state_t *state)
     const ivl_sample_t *sample = &state->sense.sample;
     if (state->level.rises && !(sample->v_WB_mps.z > 0.0f))
     {
-        turn(state);
+        turn(cfg, state);
     }
     return state->level.rises ? rise(cfg, sample) : brake(cfg, state);
 }

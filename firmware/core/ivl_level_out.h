@@ -12,19 +12,19 @@
 /// @return in m, >= 0
 float ivl_level_out_rise_m(const ivl_cfg_t *cfg, float v_close_mps, float thrust_mps2);
 
-/// True if this tick of an approach is the last one, or later, at which a level-out keeps level_margin between vehicle and ceiling.
-bool ivl_level_out_is_last(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen);
+/// An approach begins here: nothing is decided, and a level-out would come back to this height.  Until a cue is valid for the first time, the
+/// ceiling is taken to be where h_ceil says.
+void ivl_level_out_prepare(ivl_state_t *state);
 
-/// True if go or no-go is to be decided in this tick: it has not been decided in this approach, and the policy would flip now, or it is the
-/// last moment, while the ceiling comes closer.  Asked with a valid cue.
-bool ivl_level_out_asked(const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_seen_t *seen);
+/// Once a tick of an approach, after the policy: is go or no-go to be decided in this tick?  It is, while the ceiling comes closer, when the
+/// policy would flip now, or when this is the last tick, or later, at which a level-out keeps level_margin between vehicle and ceiling.  A go at
+/// the last moment stands until there is a way back again, as when the distance has become more certain.
+/// Without a valid cue the last distance and speed are carried on.  [MODEL section 14]
+void ivl_level_out_ask(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen);
 
-/// Begin: cut the thrust and rise.
-void ivl_level_out_begin(ivl_state_t *state);
-
-/// Reference of this tick; then advance.
+/// Reference of this tick, in LEVEL_OUT, and in ABORTED until it rests; then advance.
 ivl_reference_t ivl_level_out_next(const ivl_cfg_t *cfg, ivl_state_t *state);
 
-/// True once the reference rests: the vehicle is to hover from now on.
+/// True once the reference rests: the vehicle is to hover from now on.  Also true where no approach has begun.
 bool ivl_level_out_rests(const ivl_state_t *state);
 #endif  // IVL_LEVEL_OUT_H

@@ -68,11 +68,11 @@ CONDITION(may_approach)
 
 // ---- conditions: the landing
 
-// a vehicle that still rises towards the ceiling is not to be steered anywhere
-CONDITION(hover_after_rise)
+// a vehicle that rises towards the ceiling, or is fast along it, is not to be steered anywhere
+CONDITION(hover_from_rest)
 {
     UNUSED(cfg), UNUSED(seen);
-    return requested(state, IVL_REQUEST_HOVER) && !state->level.rises;
+    return requested(state, IVL_REQUEST_HOVER) && ivl_level_out_rests(state);
 }
 
 CONDITION(triggered)
@@ -127,8 +127,8 @@ static const row_t ROWS[] = {
         ON(request_idle,     IDLE),
         ON(request_abort,    ABORTED),
         RULE(ABORT,          ABORTED),
-        ON(request_hover,    READY),
         RULE(LEVEL,          LEVEL_OUT),
+        ON(request_hover,    LEVEL_OUT),
         ON(triggered,        FLIP)), IVL_DRIVE_APPROACH},
     [IVL_PHASE_FLIP] = {EXITS(
         ON(request_idle,     IDLE),
@@ -150,7 +150,7 @@ static const row_t ROWS[] = {
         ON(request_idle,     IDLE),
         ON(request_abort,    ABORTED),
         RULE(ABORT,          ABORTED),
-        ON(hover_after_rise, READY)), IVL_DRIVE_LEVEL},
+        ON(hover_from_rest,  READY)), IVL_DRIVE_LEVEL},
 };
 // clang-format on
 
@@ -169,6 +169,8 @@ static void enter_ready(ivl_state_t *state)
     memset(&state->snapshot, 0, sizeof state->snapshot);
     memset(&state->action, 0, sizeof state->action);
     memset(&state->decision, 0, sizeof state->decision);
+    // nothing to level out
+    state->level = (ivl_level_t){.z_W_m = IVL_SENSE_P_M_MAX};
 }
 
 static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, const ivl_seen_t *seen)
@@ -183,9 +185,7 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
         state->p_hold_W_m = sample->p_WB_m;
         break;
     case IVL_PHASE_APPROACH:
-        memset(&state->decision, 0, sizeof state->decision);
-        // where a level-out comes back to
-        state->p_hold_W_m = sample->p_WB_m;
+        ivl_level_out_prepare(state);
         ivl_approach_begin(cfg, &state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
         break;
     case IVL_PHASE_FLIP:
@@ -194,14 +194,17 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
         ivl_trigger_snapshot(&state->snapshot, sample, seen, &state->policy.id, &state->action);
         break;
     case IVL_PHASE_ABORTED:
-        state->p_hold_W_m = sample->p_WB_m;
+        // a vehicle on its way to the ceiling, or along it, levels out first
+        if (ivl_level_out_rests(state))
+        {
+            state->p_hold_W_m = sample->p_WB_m;
+        }
         state->abort_cut = false;
         state->landed_s = 0.0f;
         state->diag.n_abort++;
         break;
     case IVL_PHASE_LEVEL_OUT:
-        ivl_level_out_begin(state);
-        state->diag.n_no_go++;
+        state->diag.n_no_go += rule_says(state, IVL_ACT_LEVEL) ? 1u : 0u;
         break;
     case IVL_PHASE_IDLE:
     case IVL_PHASE_COAST:
@@ -222,7 +225,7 @@ static void note_cause(ivl_state_t *state)
     }
 }
 
-// go or no-go is decided once: after a go at the last moment there is no way back, so the flip is no longer asked about
+// after a go at the last moment there is no way back, so the flip is no longer asked about
 static void decide_once(ivl_state_t *state, const ivl_seen_t *seen)
 {
     ivl_decision_t *decision = &state->decision;
@@ -230,8 +233,11 @@ static void decide_once(ivl_state_t *state, const ivl_seen_t *seen)
     {
         decision->made = true;
         decision->go = state->action.go;
-        decision->p_land = state->action.p_land;
-        decision->d_ceil_m = seen->ceiling.d_ceil_m;
+        if (seen->cues.valid)
+        {
+            decision->p_land = state->action.p_land;
+            decision->d_ceil_m = seen->ceiling.d_ceil_m;
+        }
     }
 }
 
@@ -251,7 +257,7 @@ static bool take_exit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t
     if (state->phase == IVL_PHASE_APPROACH)
     {
         state->action = ivl_policy_decide(&state->policy, seen);
-        state->decision.asked = ivl_level_out_asked(cfg, state, seen);
+        ivl_level_out_ask(cfg, state, seen);
     }
     const ivl_rule_t rule = ivl_guard_find(cfg, state, seen);
     state->guard.rule = (uint8_t)rule;

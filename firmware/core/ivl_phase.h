@@ -10,7 +10,7 @@ typedef enum
     IVL_DRIVE_OFF,
     IVL_DRIVE_HOVER,     ///< track state->p_hold_W_m
     IVL_DRIVE_APPROACH,  ///< track the approach path
-    IVL_DRIVE_LAND,      ///< track state->p_hold_W_m, which descends after a while
+    IVL_DRIVE_LAND,      ///< level out, if there is anything to; then track state->p_hold_W_m, which descends after a while
     IVL_DRIVE_LEVEL,     ///< rise without drive, then brake along the ceiling and hover below
     IVL_DRIVE_FLIP       ///< front pair makes the policy's moment
 } ivl_drive_t;

@@ -12,11 +12,12 @@ typedef struct
     uint8_t  form;  ///< row of IVL_FORMS
 } ivl_policy_id_t;
 
+/// `at_once` is for studies of the flip alone, in the simulator: no packet of the radio carries it, so no policy that a host sends has it.
 typedef struct
 {
     ivl_policy_id_t id;
     uint8_t         n;        ///< parameters of the form
-    bool            at_once;  ///< flip at the first valid cue, whatever the form says of when; for studies of the flip alone
+    bool            at_once;  ///< flip at the first valid cue, whatever the form says of when and of go / no-go; see below
     float           theta[IVL_FORM_PARAMS_MAX];  ///< SI; those beyond n are 0
 } ivl_policy_t;
 

@@ -87,13 +87,13 @@ static void append(ivl_recorder_t *recorder, const ivl_cfg_t *cfg, const ivl_sta
         header->trigger_row = (uint16_t)(header->trigger_row - (is_full ? 1u : 0u));
         recorder->n_post++;
     }
-    else if (state->triggered)
+    else if (state->triggered || (state->phase == IVL_PHASE_LEVEL_OUT))
     {
         header->trigger_row = (uint16_t)(header->n_rows - 1u);
-        header->policy_seq = state->snapshot.policy.seq;
-        header->policy_crc = state->snapshot.policy.crc;
-        header->policy_form = state->snapshot.policy.form;
-        header->t_trigger_us = (uint32_t)state->snapshot.t_us;
+        header->policy_seq = state->policy.id.seq;
+        header->policy_crc = state->policy.id.crc;
+        header->policy_form = state->policy.id.form;
+        header->t_trigger_us = (uint32_t)state->sense.t_last_us;
     }
 }
 
@@ -101,8 +101,9 @@ void ivl_record_step(ivl_recorder_t *recorder, const ivl_cfg_t *cfg, const ivl_s
 {
     const bool was_idle = recorder->last_phase == IVL_PHASE_IDLE;
     const bool is_idle = state->phase == IVL_PHASE_IDLE;
+    const bool is_next = (recorder->last_phase == IVL_PHASE_READY) && (state->phase == IVL_PHASE_APPROACH);
     recorder->last_phase = state->phase;
-    if (was_idle && !is_idle)
+    if ((was_idle && !is_idle) || (is_next && (recorder->header.trigger_row != IVL_RECORD_NONE)))
     {
         start(recorder, cfg);
         recorder->last_phase = state->phase;
@@ -129,15 +130,14 @@ static uint8_t byte_at(const ivl_recorder_t *recorder, uint32_t address)
         return ((const uint8_t *)header)[address];
     }
     const uint32_t offset = address - (uint32_t)sizeof *header;
-    const uint32_t i = offset / (uint32_t)sizeof(ivl_record_row_t);
-    if (i >= header->n_rows)
+    const uint32_t row_size = (uint32_t)sizeof(ivl_record_row_t);
+    if (offset >= header->n_rows * row_size)
     {
         return 0u;
     }
     // a ring that is not full begins at row 0
     const uint32_t oldest = (header->n_rows == IVL_RECORD_ROWS) ? recorder->next : 0u;
-    const uint32_t row = (oldest + i) % IVL_RECORD_ROWS;
-    return ((const uint8_t *)&recorder->rows[row])[offset % (uint32_t)sizeof(ivl_record_row_t)];
+    return ((const uint8_t *)recorder->rows)[(oldest * row_size + offset) % (uint32_t)sizeof recorder->rows];
 }
 
 bool ivl_record_read(const ivl_recorder_t *recorder, uint32_t address, uint32_t size, uint8_t *bytes)

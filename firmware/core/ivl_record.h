@@ -1,5 +1,6 @@
 /// @file ivl_record.h
-/// Flight recorder around one flip: a ring of compact rows, one a tick, that freezes a while after the trigger and is then read as a memory.
+/// Flight recorder around one flip or level-out: a ring of compact rows, one a tick, that freezes a while after its begin and is then read as
+/// a memory.  Its begin is the trigger, or the tick in which an approach was called off: the decision, the rise and the highest point stay.
 /// For the port; the pipeline does not use it.  The reader sees a header of 36 bytes, then the rows in order of time, all little-endian.
 #ifndef IVL_RECORD_H
 #define IVL_RECORD_H
@@ -9,8 +10,8 @@
 #define IVL_RECORD_MAGIC     0x524C5649u  ///< "IVLR"
 #define IVL_RECORD_VERSION   2u
 #define IVL_RECORD_ROWS      448u     ///< 0.9 s at 500 Hz in 19.7 kB
-#define IVL_RECORD_ROWS_POST 350u     ///< rows after the trigger; the others are from before it
-#define IVL_RECORD_NONE      0xFFFFu  ///< no row of the trigger
+#define IVL_RECORD_ROWS_POST 350u     ///< rows after the begin; the others are from before it
+#define IVL_RECORD_NONE      0xFFFFu  ///< no row of a begin
 
 // clang-format off
 /// Header: X(type, name, doc)
@@ -19,15 +20,15 @@
     X(u8, version, "IVL_RECORD_VERSION")                                         \
     X(u8, row_size, "bytes a row")                                               \
     X(u16, n_rows, "rows that follow")                                           \
-    X(u16, trigger_row, "row of the trigger tick, IVL_RECORD_NONE if none")      \
+    X(u16, trigger_row, "row of the trigger, or of the begin of a level-out; IVL_RECORD_NONE if none") \
     X(u8, frozen, "1: complete; 0: still recording, no row can be read")         \
     X(u8, policy_form, "its form")                                               \
-    X(u32, n_cycle, "arm cycles since the start: changes with each recording")   \
-    X(u32, policy_seq, "number of the policy that triggered")                    \
+    X(u32, n_cycle, "recordings since the start")                                \
+    X(u32, policy_seq, "number of the policy that triggered or was called off")  \
     X(u32, policy_crc, "its checksum")                                           \
     X(f32, tick_hz, "rows per second")                                           \
     X(f32, thrust_N_max, "thrust that 255 stands for, N")                        \
-    X(u32, t_trigger_us, "low 32 bits of snapshot.t_us")
+    X(u32, t_trigger_us, "low 32 bits of t_us at trigger_row")
 
 /// Row: X(type, name, count, per_unit, unit, doc); value in `unit` = number / per_unit, limited to the range of the type
 #define IVL_RECORD_ROW(X)                                                        \
@@ -68,8 +69,8 @@ typedef struct
 /// Nothing recorded.
 void ivl_record_init(ivl_recorder_t *recorder);
 
-/// After each ivl_step: starts anew with each arm cycle, records while not in IDLE, freezes IVL_RECORD_ROWS_POST rows after the trigger, or when
-/// the cycle ends earlier.
+/// After each ivl_step: starts anew with each arm cycle, and with an approach after one that was called off; records while not in IDLE, freezes
+/// IVL_RECORD_ROWS_POST rows after the trigger or the begin of a level-out, or when the cycle ends earlier.
 void ivl_record_step(ivl_recorder_t *recorder, const ivl_cfg_t *cfg, const ivl_state_t *state, const ivl_out_t *out);
 
 /// Size of what can be read: header and IVL_RECORD_ROWS rows, whatever has been recorded.

@@ -16,7 +16,7 @@ typedef struct
     uint32_t n_policy_refused;  ///< policies refused: form, range or phase
     uint32_t n_abort;           ///< entries into ABORTED
     uint32_t n_trigger;         ///< triggers fired
-    uint32_t n_no_go;           ///< approaches called off
+    uint32_t n_no_go;           ///< approaches called off: no-go, or no cue at the last moment
 } ivl_diag_t;
 
 /// What the safety rules remember.
@@ -39,20 +39,23 @@ typedef struct
     bool  cfg_good;  ///< false: ivl_cfg_check refused the configuration, the core stays in IDLE
 } ivl_derived_t;
 
-/// What was decided about this approach, go or no-go.  All zero before, but for `asked`.
+/// What was decided about this approach, go or no-go, and what it rests on.  The first five are zero before, but for `asked`.
 typedef struct
 {
-    bool  asked;     ///< it is to be decided in this tick
-    bool  made;      ///< it was decided
-    bool  go;        ///< the flip may start
-    float p_land;    ///< probability of a landing that decided it
-    float d_ceil_m;  ///< distance at which it was decided
+    bool  asked;        ///< it is to be decided in this tick
+    bool  made;         ///< it was decided; a go stands once there is no way back
+    bool  go;           ///< the flip may start
+    float p_land;       ///< probability of a landing that decided it; 0: no cue was ever valid when it was asked
+    float d_ceil_m;     ///< distance at which it was decided; likewise
+    float room_m;       ///< so far the vehicle may still rise: from the last valid cue, carried on since
+    float sure_m;       ///< and so much of that is not sure
+    float v_close_mps;  ///< closing speed, carried on likewise
 } ivl_decision_t;
 
-/// What LEVEL_OUT remembers.
+/// What LEVEL_OUT remembers; ABORTED goes on with it.
 typedef struct
 {
-    bool  rises;   ///< still on the way up
+    bool  rises;   ///< on the way up, from the begin of the approach on
     float z_W_m;   ///< height at which to hover in the end
     float rest_s;  ///< how long the reference has been at rest there
     float vx_mps;  ///< velocity of the reference along the ceiling, once the vehicle rises no more
@@ -77,8 +80,8 @@ typedef struct
     float          landed_s;    ///< ABORTED: how long the reference has been at land_height
     ivl_guard_t    guard;
     ivl_contact_t  contact;
-    ivl_distance_t distance;
     ivl_snapshot_t snapshot;  ///< latched at the trigger tick, cleared when the next arm cycle starts
     ivl_diag_t     diag;
+    ivl_distance_t distance;  ///< last, since it is the largest: offsets of the others stay short
 } ivl_state_t;
 #endif  // IVL_STATE_H

@@ -4,13 +4,7 @@
 void ivl_trigger_snapshot(ivl_snapshot_t *snapshot, const ivl_sample_t *sample, const ivl_seen_t *seen, const ivl_policy_id_t *policy,
                           const ivl_action_t *action)
 {
-    snapshot->t_us = sample->t_us;
-    snapshot->t_pose_us = sample->t_pose_us;
-    snapshot->p_WB_m = sample->p_WB_m;
-    snapshot->v_WB_mps = sample->v_WB_mps;
-    snapshot->q_WB = sample->q_WB;
-    snapshot->w_B_radps = sample->w_B_radps;
-    snapshot->f_B_mps2 = sample->f_B_mps2;
+    snapshot->sample = *sample;
     snapshot->d_ceil_m = seen->ceiling.d_ceil_m;
     snapshot->d_sigma_m = seen->ceiling.d_sigma_m;
     snapshot->rrev_per_s = seen->cues.rrev_per_s;

@@ -7,13 +7,7 @@
 /// The world as it was at the trigger tick; all zero before.
 typedef struct
 {
-    uint64_t        t_us;
-    uint64_t        t_pose_us;
-    ivl_vec3_t      p_WB_m;
-    ivl_vec3_t      v_WB_mps;
-    ivl_quat_t      q_WB;
-    ivl_vec3_t      w_B_radps;
-    ivl_vec3_t      f_B_mps2;
+    ivl_sample_t    sample;  ///< the sensed state
     float           d_ceil_m;
     float           d_sigma_m;
     float           rrev_per_s;

@@ -29,15 +29,15 @@ typedef enum
 /// Phases of one landing; the numbers are part of the log format.  The transitions stand in the table of ivl_phase.c.
 typedef enum
 {
-    IVL_PHASE_IDLE,       ///< motors off, waiting for a request
-    IVL_PHASE_READY,      ///< hover at the commanded point
-    IVL_PHASE_APPROACH,   ///< accelerate to the commanded velocity and hold it; the trigger is live
-    IVL_PHASE_FLIP,       ///< front pair alone makes the policy's moment
-    IVL_PHASE_COAST,      ///< motors off, body rotates freely
-    IVL_PHASE_ATTACHED,   ///< motors off, contact or hanging was sensed
-    IVL_PHASE_DONE,       ///< motors off until the next request cycle
-    IVL_PHASE_ABORTED,    ///< level hover at the abort point, then landing, while the sensed state is good; else motors off for good
-    IVL_PHASE_LEVEL_OUT,  ///< no-go: keep off the ceiling, brake, hover below until the next request
+    IVL_PHASE_IDLE,      ///< motors off, waiting for a request
+    IVL_PHASE_READY,     ///< hover at the commanded point
+    IVL_PHASE_APPROACH,  ///< accelerate to the commanded velocity and hold it; the trigger is live
+    IVL_PHASE_FLIP,      ///< front pair alone makes the policy's moment
+    IVL_PHASE_COAST,     ///< motors off, body rotates freely
+    IVL_PHASE_ATTACHED,  ///< motors off, contact or hanging was sensed
+    IVL_PHASE_DONE,      ///< motors off until the next request cycle
+    IVL_PHASE_ABORTED,  ///< level-out if it is in an approach, level hover, landing, while the sensed state is good; else motors off for good
+    IVL_PHASE_LEVEL_OUT,  ///< no-go, or HOVER in an approach: keep off the ceiling, brake, hover below until a HOVER
     IVL_PHASE_COUNT
 } ivl_phase_t;
 

@@ -40,7 +40,7 @@
     X(float, "ivl", "d_sigma_max", d_sigma_norm_max, "1", 0.01, 10.0, 0.25, "a distance less certain than this part of itself is invalid")   \
     X(float, "ivl", "d_old_max", d_old_s_max, "s", 0.01, 1.0, 0.25, "a distance without a measurement for longer is invalid")                \
     X(float, "ivl", "rrev_delay", rrev_delay_s, "s", 0.0, 0.06, 0.0, "from the sampling instant of a measured RREV to its arrival")          \
-    X(float, "ivl", "range_delay", range_delay_s, "s", 0.0, 0.06, 0.0, "the same of a range")                                                \
+    X(float, "ivl", "range_delay", range_delay_s, "s", 0.0, 0.12, 0.0, "the same of a range")                                                \
     X(float, "ivl", "accel_delay", accel_delay_s, "s", 0.0, 0.02, 0.0, "delay of the accelerometer's low-pass")                              \
     X(float, "ivl", "rrev_max", rrev_per_s_max, "1/s", 0.1, 100.0, 20.0, "a measured RREV beyond this is ignored")                           \
     X(float, "ivl", "rrev_sigma", rrev_sigma_per_s, "1/s", 0.001, 10.0, 0.05, "standard deviation of a measured RREV: constant part")        \
@@ -68,7 +68,7 @@
     X(float, "ivl", "kd_rate_xy", kd_rate_xy_Nmsprad, "N m s/rad", 0.0, 1.0, 0.0017, "rate gain, roll and pitch")                            \
     X(float, "ivl", "kd_rate_z", kd_rate_z_Nmsprad, "N m s/rad", 0.0, 1.0, 0.001, "rate gain, yaw")                                          \
     X(float, "ivl", "tilt_cmd_max", tilt_cmd_rad_max, "rad", 0.1, 1.2, 0.8, "largest tilt that the controller asks for")                     \
-    X(float, "ivl", "tilt_abort", tilt_abort_rad, "rad", 0.2, 1.5, 1.3, "ready and approach abort beyond this sensed tilt")                  \
+    X(float, "ivl", "tilt_abort", tilt_abort_rad, "rad", 0.2, 1.5, 1.3, "ready, approach and level_out abort beyond this sensed tilt")       \
     /* approach [P] */                                                                                                                       \
     X(float, "ivl", "approach_accel", approach_accel_mps2, "m/s^2", 0.1, 20.0, 4.3, "acceleration along the approach path")                  \
     X(uint8_t, "ivl", "shape", shape, "1", 0, 3, 0, "approach: 0 accelerate and hold, 1 accelerate, 2 hold RREV for a while, 3 into the region")\
@@ -84,8 +84,8 @@
     X(float, "ivl", "ready_s_min", ready_s_min, "s", 0.0, 60.0, 0.0, "stay in ready before an approach may start")                           \
     X(float, "ivl", "stale_s_max", stale_s_max, "s", 0.002, 1.0, 0.1, "largest age of a sample that is still flown on")                      \
     X(float, "ivl", "approach_s_max", approach_s_max, "s", 0.1, 60.0, 10.0, "an approach without trigger aborts after this")                 \
-    X(float, "ivl", "level_margin", level_margin_m, "m", 0.0, 1.0, 0.05, "no-go: clearance that a level-out is to leave")                    \
-    X(float, "ivl", "level_out_s_max", level_out_s_max, "s", 0.1, 60.0, 10.0, "no-go: without a new request it lands after this")           \
+    X(float, "ivl", "level_margin", level_margin_m, "m", 0.0, 1.0, 0.05, "clearance that a level-out is to leave")                           \
+    X(float, "ivl", "level_out_s_max", level_out_s_max, "s", 0.1, 60.0, 10.0, "a level_out without a HOVER lands after this")               \
     X(float, "ivl", "flip_s_max", flip_s_max, "s", 0.01, 5.0, 1.0, "motors are cut this long after the trigger at the latest")               \
     X(float, "ivl", "coast_s_max", coast_s_max, "s", 0.1, 10.0, 2.5, "coast without contact ends after this")                                \
     X(float, "ivl", "attached_s", attached_s, "s", 0.0, 10.0, 1.0, "stay in attached before done")                                           \
@@ -102,7 +102,7 @@
     X(float, "ivl", "p_sigma_max", p_sigma_m_max, "m", 0.001, 10.0, 0.1, "position less certain than this aborts")                           \
     X(float, "ivl", "speed_abort", speed_abort_mps, "m/s", 0.1, 50.0, 9.0, "sensed speed above this aborts")                                 \
     X(float, "ivl", "d_abort", d_abort_m, "m", 0.0, 1.0, 0.0, "an approach this close to the ceiling aborts")                                \
-    X(float, "ivl", "fence_x_min", fence_x_m_min, "m", -200.0, 200.0, -100.0, "ready and approach abort outside this box in W")              \
+    X(float, "ivl", "fence_x_min", fence_x_m_min, "m", -200.0, 200.0, -100.0, "ready, approach and level_out abort outside this box in W")   \
     X(float, "ivl", "fence_x_max", fence_x_m_max, "m", -200.0, 200.0, 100.0, "same box")                                                     \
     X(float, "ivl", "fence_y_min", fence_y_m_min, "m", -200.0, 200.0, -100.0, "same box")                                                    \
     X(float, "ivl", "fence_y_max", fence_y_m_max, "m", -200.0, 200.0, 100.0, "same box")                                                     \
@@ -160,8 +160,8 @@
     X(uint8_t, "ivl", "go", ivl_state_t, action.go, "1", "0 if the policy finds a landing too improbable")             \
     X(float, "ivl", "flip_moment", ivl_state_t, action.moment_Nm, "N m", "moment that the policy asks for")              \
     X(float, "ivl", "p_land", ivl_state_t, action.p_land, "1", "probability of a landing that the policy estimates, 1 if it does not")\
-    X(float, "ivl", "p_decided", ivl_state_t, decision.p_land, "1", "that probability when go or no-go was decided, 0 before")\
-    X(float, "ivl", "d_decided", ivl_state_t, decision.d_ceil_m, "m", "distance at which go or no-go was decided, 0 before")\
+    X(float, "ivl", "p_decided", ivl_state_t, decision.p_land, "1", "that probability when go or no-go was decided last, 0 before, or if there was no cue")\
+    X(float, "ivl", "d_decided", ivl_state_t, decision.d_ceil_m, "m", "distance at which go or no-go was decided last, 0 before, or if there was no cue")\
     X(uint8_t, "ivl", "decided", ivl_state_t, decision.made, "1", "1 once go or no-go was decided in this approach")       \
     X(float, "ivl", "aim_vx", ivl_state_t, approach.aim.vx_mps, "m/s", "velocity along W x that the approach aims at, 0 before")\
     X(float, "ivl", "aim_vz", ivl_state_t, approach.aim.vz_mps, "m/s", "velocity along W z that the approach aims at, 0 before")\
@@ -169,8 +169,8 @@
     X(float, "ivl", "trg_d_sigma", ivl_state_t, snapshot.d_sigma_m, "m", "standard deviation of the distance at the trigger")\
     X(float, "ivl", "trg_rrev", ivl_state_t, snapshot.rrev_per_s, "1/s", "RREV at the trigger")                          \
     X(float, "ivl", "trg_of_y", ivl_state_t, snapshot.of_y_radps, "rad/s", "ventral flow at the trigger")                \
-    X(float, "ivl", "trg_vx", ivl_state_t, snapshot.v_WB_mps.x, "m/s", "velocity along W x at the trigger")              \
-    X(float, "ivl", "trg_vz", ivl_state_t, snapshot.v_WB_mps.z, "m/s", "velocity along W z at the trigger")              \
+    X(float, "ivl", "trg_vx", ivl_state_t, snapshot.sample.v_WB_mps.x, "m/s", "velocity along W x at the trigger")       \
+    X(float, "ivl", "trg_vz", ivl_state_t, snapshot.sample.v_WB_mps.z, "m/s", "velocity along W z at the trigger")       \
     X(float, "ivl", "trg_moment", ivl_state_t, snapshot.action.moment_Nm, "N m", "moment of the flip")                   \
     X(uint32_t, "ivl", "trg_seq", ivl_state_t, snapshot.policy.seq, "1", "number of the policy that triggered")          \
     X(uint32_t, "ivl", "trg_crc", ivl_state_t, snapshot.policy.crc, "1", "its checksum")                                 \
@@ -180,6 +180,6 @@
     X(uint32_t, "ivl", "n_refused", ivl_state_t, diag.n_policy_refused, "1", "policies refused")                         \
     X(uint32_t, "ivl", "n_abort", ivl_state_t, diag.n_abort, "1", "entries into aborted")                                \
     X(uint32_t, "ivl", "n_trigger", ivl_state_t, diag.n_trigger, "1", "triggers fired")                                  \
-    X(uint32_t, "ivl", "n_no_go", ivl_state_t, diag.n_no_go, "1", "approaches called off")
+    X(uint32_t, "ivl", "n_no_go", ivl_state_t, diag.n_no_go, "1", "approaches called off: no-go, or no cue at the last moment")
 // clang-format on
 #endif  // IVL_VARS_H

@@ -5,83 +5,132 @@
 
 // ---- one member, little-endian whatever the machine
 
-static uint8_t *put_bytes(uint8_t *at, uint32_t value, size_t size)
+static void put_bytes(uint8_t *at, uint32_t value, size_t size)
 {
     for (size_t i = 0; i < size; i++)
     {
         at[i] = (uint8_t)(value >> (8u * i));
     }
-    return at + size;
 }
 
-static const uint8_t *get_bytes(const uint8_t *at, uint32_t *value, size_t size)
+static uint32_t get_bytes(const uint8_t *at, size_t size)
 {
-    *value = 0;
-    for (size_t i = 0; i < size; i++)
+    uint32_t value = 0;
+    for (size_t i = size; i > 0; i--)
     {
-        *value |= (uint32_t)at[i] << (8u * i);
+        value = (value << 8) | at[i - 1u];
     }
-    return at + size;
+    return value;
 }
 
-static uint32_t bits_of_f32(float x)
+// a member's number as the machine keeps it
+static uint32_t load(const void *member, size_t size)
 {
-    uint32_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return bits;
+    uint8_t  one;
+    uint16_t two;
+    uint32_t four;
+    switch (size)
+    {
+    case sizeof one:
+        memcpy(&one, member, sizeof one);
+        return one;
+    case sizeof two:
+        memcpy(&two, member, sizeof two);
+        return two;
+    default:
+        memcpy(&four, member, sizeof four);
+        return four;
+    }
 }
 
-static float f32_of_bits(uint32_t bits)
+static void store(void *member, uint32_t value, size_t size)
 {
-    float x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
+    const uint8_t  one = (uint8_t)value;
+    const uint16_t two = (uint16_t)value;
+    switch (size)
+    {
+    case sizeof one:
+        memcpy(member, &one, sizeof one);
+        break;
+    case sizeof two:
+        memcpy(member, &two, sizeof two);
+        break;
+    default:
+        memcpy(member, &value, sizeof value);
+        break;
+    }
 }
 
 void ivl_wire_put_f32(uint8_t *bytes, float value)
 {
-    (void)put_bytes(bytes, bits_of_f32(value), sizeof value);
+    put_bytes(bytes, load(&value, sizeof value), sizeof value);
 }
-
-#define BITS_u8(x)  (x)
-#define BITS_u16(x) (x)
-#define BITS_u32(x) (x)
-#define BITS_i8(x)  ((uint8_t)(x))
-#define BITS_f32(x) bits_of_f32(x)
-
-#define VALUE_u8(bits)  ((uint8_t)(bits))
-#define VALUE_u16(bits) ((uint16_t)(bits))
-#define VALUE_u32(bits) (bits)
-#define VALUE_i8(bits)  ((int8_t)(uint8_t)(bits))
-#define VALUE_f32(bits) f32_of_bits(bits)
 
 // ---- whole packets, from their tables
 
+typedef struct
+{
+    uint8_t offset, size;
+} place_t;
+
+typedef struct
+{
+    const place_t *places;
+    uint8_t        n;
+    uint8_t        type;
+    uint8_t        size;  // of the packet
+} layout_t;
+
+static size_t put(uint8_t *bytes, const layout_t *layout, const void *packet)
+{
+    uint8_t *at = bytes + 2;
+    bytes[0] = layout->type;
+    bytes[1] = (uint8_t)IVL_WIRE_VERSION;
+    for (const place_t *m = layout->places; m < layout->places + layout->n; m++)
+    {
+        put_bytes(at, load((const uint8_t *)packet + m->offset, m->size), m->size);
+        at += m->size;
+    }
+    return layout->size;
+}
+
+static bool get(const uint8_t *bytes, size_t size, const layout_t *layout, void *packet)
+{
+    if ((size != layout->size) || (bytes[0] != layout->type) || (bytes[1] != (uint8_t)IVL_WIRE_VERSION))
+    {
+        return false;
+    }
+    const uint8_t *at = bytes + 2;
+    for (const place_t *m = layout->places; m < layout->places + layout->n; m++)
+    {
+        store((uint8_t *)packet + m->offset, get_bytes(at, m->size), m->size);
+        at += m->size;
+    }
+    return true;
+}
+
 #define SIZE_OF(type, name, unit, doc) +sizeof(ivl_##type##_t)
-#define PUT(type, name, unit, doc)     at = put_bytes(at, BITS_##type(packet->name), sizeof(ivl_##type##_t));
-#define GET(type, name, unit, doc)                                                                                                         \
-    at = get_bytes(at, &bits, sizeof(ivl_##type##_t));                                                                                     \
-    packet->name = VALUE_##type(bits);
+#define PLACE(type, name, unit, doc)   {offsetof(packet_t, name), sizeof(ivl_##type##_t)},
 
 #define CODEC(lower, UPPER)                                                                                                                \
     _Static_assert(2u IVL_WIRE_##UPPER(SIZE_OF) <= IVL_WIRE_SIZE_MAX, "a packet fits into the channel");                                   \
+    static const layout_t *layout_of_##lower(void)                                                                                         \
+    {                                                                                                                                      \
+        typedef ivl_wire_##lower##_t packet_t;                                                                                             \
+        static const place_t         PLACES[] = {IVL_WIRE_##UPPER(PLACE)};                                                                 \
+        static const layout_t        LAYOUT = {.places = PLACES,                                                                           \
+                                               .n = (uint8_t)(sizeof PLACES / sizeof PLACES[0]),                                           \
+                                               .type = (uint8_t)IVL_WIRE_TYPE_##UPPER,                                                     \
+                                               .size = (uint8_t)(2u IVL_WIRE_##UPPER(SIZE_OF))};                                           \
+        return &LAYOUT;                                                                                                                    \
+    }                                                                                                                                      \
     size_t ivl_wire_put_##lower(uint8_t *bytes, const ivl_wire_##lower##_t *packet)                                                        \
     {                                                                                                                                      \
-        uint8_t *at = bytes + 2;                                                                                                           \
-        bytes[0] = (uint8_t)IVL_WIRE_TYPE_##UPPER;                                                                                         \
-        bytes[1] = (uint8_t)IVL_WIRE_VERSION;                                                                                              \
-        IVL_WIRE_##UPPER(PUT) return (size_t)(at - bytes);                                                                                 \
+        return put(bytes, layout_of_##lower(), packet);                                                                                    \
     }                                                                                                                                      \
     bool ivl_wire_get_##lower(const uint8_t *bytes, size_t size, ivl_wire_##lower##_t *packet)                                             \
     {                                                                                                                                      \
-        if ((size != 2u IVL_WIRE_##UPPER(SIZE_OF)) || (bytes[0] != (uint8_t)IVL_WIRE_TYPE_##UPPER) ||                                      \
-            (bytes[1] != (uint8_t)IVL_WIRE_VERSION))                                                                                       \
-        {                                                                                                                                  \
-            return false;                                                                                                                  \
-        }                                                                                                                                  \
-        const uint8_t *at = bytes + 2;                                                                                                     \
-        uint32_t       bits;                                                                                                               \
-        IVL_WIRE_##UPPER(GET) return true;                                                                                                 \
+        return get(bytes, size, layout_of_##lower(), packet);                                                                              \
     }
 
 CODEC(policy, POLICY)

@@ -15,6 +15,10 @@ typedef struct
 paramVarId_t paramGetVarId(const char *group, const char *name);
 unsigned int paramGetUint(paramVarId_t varid);
 
+/// Write a value of the table, and tell clients.
+void paramSetInt(paramVarId_t varid, int valuei);
+void paramSetFloat(paramVarId_t varid, float valuef);
+
 struct param_s
 {
     uint8_t type;

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from ivl import forms, yamlfile
+from ivl import forms, references, yamlfile
 from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
 from ivl.rewards import RewardChoice
@@ -229,6 +229,7 @@ def replace(data: dict[str, Any], replacements: Mapping[str, Any]) -> None:
     """Replace fields of raw data; None leaves what is there, `learner` is a name and drops the options."""
     for name, value in replacements.items():
         if value is not None:
+            value = references.absolute(value, Path.cwd()) if name in references.FIELDS else value  # noqa: PLW2901
             data[name] = {"name": value} if name == "learner" else value
 
 

@@ -6,6 +6,8 @@ print(form.names, [p.unit for p in form.params])
 A theta is given in the units that people use (N mm, say); `Form.to_si` turns it into the numbers that travel.
 """
 
+import hashlib
+import json
 import re
 import sqlite3
 from dataclasses import dataclass
@@ -81,6 +83,12 @@ class Form:
     def n(self) -> int:
         """Number of parameters."""
         return len(self.params)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the name of the form, and of the names, units and ranges of its parameters in their order."""
+        rows = [[p.name, p.unit, p.si, p.lo, p.hi] for p in self.params]
+        return hashlib.sha256(json.dumps([self.name, rows]).encode()).hexdigest()
 
     def to_si(self, theta: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Numbers in SI units of a theta in the units of the parameters, shape (..., n) each.

@@ -17,7 +17,7 @@ from ivl import forms, model, yamlfile
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.seeds import Purpose, derive
-from ivl.settings import Finite, check_overrides
+from ivl.settings import Finite, check_overrides, read_mapping
 from ivl.task import Task, settings_of
 from ivl.world import Trace, World
 
@@ -102,7 +102,7 @@ def load(path: Path) -> LandingSpec:
     Raises:
         ConfigError: One line naming file, field and value.
     """
-    spec = yamlfile.validate(LandingSpec, yamlfile.read(path), path.name)
+    spec = yamlfile.validate(LandingSpec, read_mapping(path), path.name)
     check_overrides(spec.overrides, path.name)
     return spec
 

@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ivl import native, yamlfile
 from ivl.errors import ConfigError
+from ivl.references import absolute, is_path
 
 VEHICLES_DIR = Path(__file__).parent / "vehicles"
 GEARS_DIR = Path(__file__).parent / "gears"
@@ -196,7 +197,7 @@ def _load_sensors(
             )
     given: dict[str, Quantity | _Reference] = {}
     for name in header.includes:
-        given |= _load_sensors(name, table, (*including, path))[2]
+        given |= _load_sensors(absolute(name, path.parent), table, (*including, path))[2]
     references = _references(groups, path.name, table)
     numbers = {
         group: {key: raw for key, raw in members.items() if f"{group}.{key}" not in references}
@@ -305,7 +306,7 @@ def unit(name: str) -> str:
 
 def _locate(name_or_path: str, folder: Path, kind: str) -> Path:
     """A path is taken as given; a bare name is looked up in the package."""
-    if name_or_path.endswith((".yaml", ".yml")) or "/" in name_or_path:
+    if is_path(name_or_path):
         path = Path(name_or_path)
         if not path.is_file():
             raise ConfigError(f"{name_or_path}: no such {kind} file")

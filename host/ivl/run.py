@@ -12,13 +12,14 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import ivl
-from ivl import assess, experiment, links, native, yamlfile
+from ivl import assess, experiment, files, links, native, numerics, references, yamlfile
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
@@ -26,6 +27,7 @@ from ivl.learning.loop import LearningRun, Progress, recent_rate, trials_of
 from ivl.learning.recorder import DISCARDED, SCORED, EpisodeRow, RolloutRows
 from ivl.links.options import Options
 from ivl.outcome import four_leg
+from ivl.settings import read_mapping
 from ivl.source import RolloutSource, WorldSource
 from ivl.store import SCHEMA_VERSION, RunStore, check_version, read_manifest, write_json
 from ivl.world import World
@@ -103,11 +105,12 @@ def run(
     """
     hooks = hooks or Hooks()
     world = chosen.make_world()
-    manifest = make_manifest(chosen, world, n_trials, uri)
+    packed, copies = references.pack(chosen)
+    manifest = make_manifest(packed, world, n_trials, uri)
     with ExitStack() as stack:
         source = _open_source(uri, chosen, world, threads, folder, flight)
         stack.callback(source.close)
-        store = stack.enter_context(_open(folder, chosen, manifest, resume))
+        store = stack.enter_context(_open(folder, packed, copies, manifest, resume))
         if hooks.on_start:
             hooks.on_start(folder)
         LearningRun(trials_of(chosen, n_trials or 1), source, store).run(hooks.on_episode)
@@ -145,7 +148,15 @@ def read_config(folder: Path) -> tuple[Experiment, int | None]:
     """
     manifest = read_manifest(folder)
     check_version(folder, manifest, SCHEMA_VERSION)  # before the configuration, which may have changed its form too
-    data = yamlfile.read(folder / "config.yaml")
+    path = folder / "config.yaml"
+    try:
+        damaged = hashlib.sha256(path.read_bytes()).hexdigest() != manifest.get("config_sha256")
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {files.reason(error)}") from error
+    if damaged:
+        raise StoreError(f"{path}: is not as it was written")
+    references.check(folder)
+    data = read_mapping(path)
     return experiment.from_data(data, str(folder / "config.yaml")), manifest.get("trials")
 
 
@@ -160,16 +171,26 @@ def default_folder(chosen: Experiment, n_trials: int | None, resume: bool) -> Pa
 
 
 def numbered_folder(base: str, resume: bool) -> Path:
-    """`runs/base`, `runs/base-2` ...: the first that is free; with `resume` the last that is there.
+    """`runs/base`, `runs/base-2` ...: the first that is free, made; with `resume` the last that is there.
 
     Raises:
-        StoreError: Nothing is there to resume.
+        StoreError: Nothing is there to resume, or the folder cannot be made.
     """
-    number, existing = 1, None
-    while (candidate := Path("runs") / (base if number == 1 else f"{base}-{number}")).exists():
-        existing, number = candidate, number + 1
-    if not resume:
-        return candidate
+    existing = None
+    for number in count(1):
+        candidate = Path("runs") / (base if number == 1 else f"{base}-{number}")
+        try:
+            if not resume:
+                candidate.mkdir(parents=True)  # of two programs that start at once, one gets it
+                return candidate
+            candidate.stat()
+        except FileExistsError:
+            continue
+        except FileNotFoundError:
+            break
+        except OSError as error:
+            raise StoreError(f"{candidate}: the run folder cannot be made: {files.reason(error)}") from error
+        existing = candidate
     if existing is None:
         raise StoreError(f"runs/{base}: there is no run to resume; name its folder with --out")
     return existing
@@ -193,6 +214,7 @@ def make_manifest(
         "git_commit": git_commit(),
         "python": platform.python_version(),
         "numpy": np.__version__,
+        "numerics": numerics.kernel(),
         "platform": platform.platform(),
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "units": {f"out_{name}": field.unit for name, field in library.outcome_fields.items()},
@@ -202,18 +224,25 @@ def make_manifest(
     }
 
 
-def _open(folder: Path, chosen: Experiment, manifest: dict[str, Any], resume: bool) -> RunStore:
+def _open(
+    folder: Path, chosen: Experiment, copies: dict[str, bytes], manifest: dict[str, Any], resume: bool
+) -> RunStore:
     dtype = native.library().outcome_dtype
     layout = layout_of(chosen)
     if not resume or not (folder / "manifest.json").exists():
         if resume and not folder.exists():
             raise StoreError(f"{folder}: there is no run to resume")
-        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype, layout)
+        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype, layout, copies)
     old = read_manifest(folder)
     check_version(folder, old, SCHEMA_VERSION)
     for key in _MUST_MATCH:
         if old.get(key) != manifest[key]:
             raise StoreError(f"{folder}: cannot be resumed: {_difference(folder, key, old, manifest, chosen)}")
+    if old.get("numerics", manifest["numerics"]) != manifest["numerics"]:
+        raise StoreError(
+            f"{folder}: cannot be resumed: it was computed by {old['numerics']}, here is {manifest['numerics']}, so "
+            f"its search would not continue bit for bit ({numerics.ADVICE})"
+        )
     store = RunStore.open_existing(folder, dtype)
     if store.layout != layout:
         store.close()

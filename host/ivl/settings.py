@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ivl import model, native, yamlfile
+from ivl import model, native, references, yamlfile
 from ivl.errors import ConfigError
 
 PACKAGE_DIR = Path(__file__).parent
@@ -41,10 +41,11 @@ def locate(path: str, shipped: Sequence[str]) -> Path:
 
 
 def read_mapping(file: Path) -> dict[str, Any]:
-    """The fields of a YAML file, not checked yet."""
+    """The fields of a YAML file, not checked yet; the files that it names by absolute paths."""
     data = yamlfile.read(file)
     if not isinstance(data, dict):
         raise ConfigError(f"{file.name}: expected a mapping of fields, got {type(data).__name__}")
+    references.resolve(data, file.parent)
     return data
 
 
@@ -67,6 +68,7 @@ def apply_setting(data: dict[str, Any], setting: str, kind: type[BaseModel], lab
     """
     path, value = parse_setting(setting)
     check_path(path, kind, label)
+    value = references.absolute(value, Path.cwd()) if path in references.FIELDS else value
     put(data, path, value, "set on the command line", f"{label}: --set {setting}")
 
 

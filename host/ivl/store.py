@@ -2,7 +2,9 @@
 
     config.yaml     the resolved experiment
     manifest.json   schema version, seed, trials, hashes of model and library, versions, units
-    run.sqlite      rollouts, episodes, learner states, and what the columns of policy and reward mean
+    run.sqlite      rollouts, episodes, learner states, what the columns of policy and reward mean, and seals: digests
+                    of finished episodes and learner states, so that a damaged number is found and not read
+    files/          copies of the files that the configuration names
 
 SQLite in WAL mode with synchronous=FULL: a commit is on the disk when it returns, and a transaction is there whole or
 not at all. An episode passes three commits: *planned* (policies and the learners' states after `ask`), *scored* (each
@@ -11,21 +13,27 @@ commits is repeated on resume with the same random numbers, so a continued run e
 bit. SQLite stores float64 exactly, but for the sign of a zero; NaN is stored as NULL.
 """
 
+import errno
 import fcntl
+import hashlib
 import json
 import math
 import os
+import shutil
 import sqlite3
+import tempfile
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import numpy.typing as npt
 
 import ivl
-from ivl.errors import StoreError
+from ivl import files, references
+from ivl.errors import IvlError, StoreError
 from ivl.layout import Layout
 from ivl.learning.recorder import DISCARDED, PLANNED, SCORED, EpisodeRow, RolloutRows
 from ivl.outcome import Outcomes
@@ -36,11 +44,25 @@ SCHEMA_VERSION = 2
 
 _ROLLOUT_KEY = "trial INTEGER, episode INTEGER, idx INTEGER"
 _SEARCH = ("mu", "sigma", "recommended")
+_OF_LEARNER = -1
+"""Number in the table of seals, in place of an episode's, of the seal of a learner's state."""
+_SNAPSHOT_TRIES = 20
+_SQLITE_ADVICE = {
+    sqlite3.SQLITE_FULL: "make room there",
+    sqlite3.SQLITE_IOERR: "look at the disk, and whether it is full",
+    sqlite3.SQLITE_READONLY: "the folder cannot be written",
+    sqlite3.SQLITE_CANTOPEN: "look at the permissions of the folder, and whether the disk is full",
+    sqlite3.SQLITE_CORRUPT: "the file is damaged",
+    sqlite3.SQLITE_NOTADB: "the file is damaged",
+}
 _EPISODE_FIGURES = {"reward_mean": "REAL", "rate_four_leg": "REAL", "rate_clean": "REAL", "stopped": "INTEGER"}
 
 
 class RunStore:
-    """One run folder, open for writing by this process alone: the recorder of a run that may be killed.
+    """One run folder, open for writing by this process alone, or for reading beside others.
+
+    As the recorder of a run it may be killed at any moment. A reader changes nothing in the folder, needs no lock and
+    no permission to write, and keeps nobody out.
 
     Attributes:
         folder: The run folder.
@@ -49,19 +71,26 @@ class RunStore:
 
     layout: Layout
 
-    def __init__(self, folder: Path, outcome_dtype: np.dtype[np.void], lock: int) -> None:
-        """Use `create` or `open_existing`; `lock` is the descriptor that keeps the folder."""
+    def __init__(self, folder: Path, outcome_dtype: np.dtype[np.void], db: sqlite3.Connection, held: ExitStack) -> None:
+        """Use `create`, `open_existing` or `open_reading`; `held` is what to give back at the end."""
         self.folder = folder
         self._outcome_dtype = outcome_dtype
         self._outcome_columns = _outcome_columns(outcome_dtype)
-        self._lock = lock
-        try:
-            self._db = sqlite3.connect(folder / "run.sqlite", isolation_level=None, timeout=10.0)
-            self._db.execute("PRAGMA journal_mode=WAL")
-            self._db.execute("PRAGMA synchronous=FULL")
-        except sqlite3.Error as error:
-            os.close(lock)
-            raise StoreError(f"{folder / 'run.sqlite'}: {error}") from error
+        self._db, self._held = db, held
+
+    @classmethod
+    def _writing(cls, folder: Path, outcome_dtype: np.dtype[np.void], mode: str) -> "RunStore":
+        """Take the lock and open the database; `mode` is SQLite's: `rwc` makes one, `rw` does not."""
+        with ExitStack() as held:
+            held.callback(os.close, lock_folder(folder))
+            if mode == "rwc":
+                _clear_unfinished(folder)
+            db = _connect(folder, folder / "run.sqlite", f"mode={mode}")
+            held.callback(db.close)
+            with _explained(folder):
+                db.execute("PRAGMA journal_mode=WAL")
+                db.execute("PRAGMA synchronous=FULL")
+            return cls(folder, outcome_dtype, db, held.pop_all())
 
     @classmethod
     def create(
@@ -71,8 +100,9 @@ class RunStore:
         manifest: Mapping[str, Any],
         outcome_dtype: np.dtype[np.void],
         layout: Layout,
+        copies: Mapping[str, bytes] | None = None,
     ) -> "RunStore":
-        """Make a new run folder.
+        """Make a new run folder; `copies` are the files that the configuration names (`ivl.references.pack`).
 
         The manifest is written last: a folder without one is a creation that was cut off, and is started over.
 
@@ -81,42 +111,61 @@ class RunStore:
         """
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            lock = lock_folder(folder)
-            try:
-                _clear_unfinished(folder)
-            except BaseException:
-                os.close(lock)
-                raise
-            store = cls(folder, outcome_dtype, lock)
-            store.layout = layout
-            with store._transaction():
-                store._create_tables()
-            write_durably(folder / "config.yaml", config_yaml.encode())
-            write_json(folder / "manifest.json", manifest)
+            with ExitStack() as undo:
+                store = cls._writing(folder, outcome_dtype, "rwc")
+                undo.callback(store.close)
+                store.layout = layout
+                with store._transaction():
+                    store._create_tables()
+                references.save(copies or {}, folder)
+                files.write(folder / "config.yaml", config_yaml)
+                write_json(folder / "manifest.json", manifest)
+                undo.pop_all()
         except OSError as error:
-            raise StoreError(f"{folder}: cannot be written: {error}") from error
+            raise StoreError(f"{folder}: cannot be written: {files.reason(error)}") from error
         return store
 
     @classmethod
     def open_existing(cls, folder: Path, outcome_dtype: np.dtype[np.void]) -> "RunStore":
-        """Open a run folder to continue or read it.
+        """Open a run folder to continue it.
 
         Raises:
             StoreError: There is no run, it is of another schema version, or another process has it open.
         """
         check_version(folder, read_manifest(folder), SCHEMA_VERSION)
-        store = cls(folder, outcome_dtype, lock_folder(folder))
-        known = [row[1] for row in store._db.execute("PRAGMA table_info(rollout)")]
-        if not known or [c for c in known if c.startswith("out_")] != list(store._outcome_columns):
-            store.close()
-            raise StoreError(f"{folder}: run.sqlite has other columns than the outcomes of this version")
-        store.layout = store._read_layout()
-        return store
+        return cls._writing(folder, outcome_dtype, "rw")._checked()
+
+    @classmethod
+    def open_reading(cls, folder: Path, outcome_dtype: np.dtype[np.void]) -> "RunStore":
+        """Open a run folder to read what is committed at this moment, whoever else reads or writes there.
+
+        Raises:
+            StoreError: There is no run, it is of another schema version, or cannot be read.
+        """
+        check_version(folder, read_manifest(folder), SCHEMA_VERSION)
+        with ExitStack() as held:
+            try:
+                path, options = _snapshot(folder, held)
+            except OSError as error:
+                raise StoreError(f"{folder / 'run.sqlite'}: cannot be read: {files.reason(error)}") from error
+            db = _connect(folder, path, options)
+            held.callback(db.close)
+            return cls(folder, outcome_dtype, db, held.pop_all())._checked()
+
+    def _checked(self) -> "RunStore":
+        with ExitStack() as undo, _explained(self.folder):
+            undo.callback(self.close)
+            known = [row[1] for row in self._db.execute("PRAGMA table_info(rollout)")]
+            if not known or [c for c in known if c.startswith("out_")] != list(self._outcome_columns):
+                raise StoreError(f"{self.folder}: run.sqlite has other columns than the outcomes of this version")
+            self.layout = self._read_layout()
+            self._check_seals()
+            undo.pop_all()
+        return self
 
     def close(self) -> None:
         """Close the database and release the folder."""
-        self._db.close()
-        os.close(self._lock)
+        self._held.close()
 
     def __enter__(self) -> "RunStore":
         """The store itself."""
@@ -191,15 +240,18 @@ class RunStore:
                 f"INSERT INTO episode VALUES({_marks(('trial', 'episode', *self._figures()))})", values
             )
             self._save_states([r.trial for r in rows], states)
+            self._seal((r.trial, r.episode, self._digest(r.trial, r.episode)) for r in rows)
 
     def learner_states(self) -> dict[int, dict[str, Any]]:
         """The last saved state of each trial's learner."""
-        return {trial: json.loads(text) for trial, text in self._db.execute("SELECT trial, state FROM learner")}
+        with _explained(self.folder):
+            return {trial: json.loads(text) for trial, text in self._db.execute("SELECT trial, state FROM learner")}
 
     def episodes(self) -> list[EpisodeRow]:
         """All finished episodes, ordered by (trial, episode)."""
         query = f"SELECT trial, episode, {', '.join(self._figures())} FROM episode ORDER BY trial, episode"
-        return [_episode_row(row, len(self.layout.policy)) for row in self._db.execute(query)]
+        with _explained(self.folder):
+            return [_episode_row(row, len(self.layout.policy)) for row in self._db.execute(query)]
 
     def rollouts(self, trial: int | None = None, episode: int | None = None) -> RolloutRows:
         """Rollouts of one trial or all, of one episode or all."""
@@ -210,9 +262,10 @@ class RunStore:
         given = {name: value for name, value in wanted.items() if value is not None}
         if given:
             query += " WHERE " + " AND ".join(f"{name}=?" for name in given)
-        rows = self._db.execute(query + " ORDER BY trial, episode, idx", tuple(given.values())).fetchall()
-        columns = zip(*rows, strict=True) if rows else ((),) * len(names)
-        return self._rollout_rows(dict(zip(names, columns, strict=True)), len(rows))
+        with _explained(self.folder):
+            rows = self._db.execute(query + " ORDER BY trial, episode, idx", tuple(given.values())).fetchall()
+            columns = zip(*rows, strict=True) if rows else ((),) * len(names)
+            return self._rollout_rows(dict(zip(names, columns, strict=True)), len(rows))
 
     def _rollout_rows(self, column: Mapping[str, Sequence[Any]], n: int) -> RolloutRows:
         rewards = {
@@ -254,6 +307,7 @@ class RunStore:
             f"CREATE TABLE episode(trial INTEGER, episode INTEGER, {figures}, PRIMARY KEY(trial, episode))"
         )
         self._db.execute("CREATE TABLE learner(trial INTEGER PRIMARY KEY, state TEXT NOT NULL)")
+        self._db.execute("CREATE TABLE seal(trial INTEGER, episode INTEGER, sha256 TEXT, PRIMARY KEY(trial, episode))")
         self._db.execute("CREATE TABLE quantity(role TEXT, place INTEGER, name TEXT, unit TEXT, doc TEXT)")
         rows = [
             (role, place, quantity.name, quantity.unit, quantity.doc)
@@ -272,6 +326,36 @@ class RunStore:
     def _save_states(self, trials: Sequence[int], states: Iterable[Mapping[str, Any]]) -> None:
         rows = [(trial, json.dumps(state, allow_nan=False)) for trial, state in zip(trials, states, strict=True)]
         self._db.executemany("INSERT OR REPLACE INTO learner(trial, state) VALUES(?,?)", rows)
+        self._seal((trial, _OF_LEARNER, hashlib.sha256(state.encode()).hexdigest()) for trial, state in rows)
+
+    def _seal(self, rows: Iterable[tuple[int, int, str]]) -> None:
+        self._db.executemany("INSERT OR REPLACE INTO seal(trial, episode, sha256) VALUES(?,?,?)", rows)
+
+    def _digest(self, trial: int, episode: int) -> str:
+        """Digest of a finished episode, of its rollouts and of its figures."""
+        said = hashlib.sha256()
+        for table, order in (("rollout", " ORDER BY idx"), ("episode", "")):
+            query = f"SELECT * FROM {table} WHERE trial=? AND episode=?{order}"
+            for row in self._db.execute(query, (trial, episode)):
+                said.update(repr(row).encode())
+        return said.hexdigest()
+
+    def _check_seals(self) -> None:
+        """Refuse a database in which a number is not what was written; SQLite itself would not notice."""
+        if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name='seal'").fetchone():
+            return  # of an earlier version, which made none
+        states = dict(self._db.execute("SELECT trial, state FROM learner"))
+        sealed = {(trial, episode): sha for trial, episode, sha in self._db.execute("SELECT * FROM seal")}
+        finished = set(self._db.execute("SELECT trial, episode FROM episode"))
+        for (trial, episode), sha256 in sealed.items():
+            text = states.get(trial, "")
+            found = (
+                hashlib.sha256(text.encode()).hexdigest() if episode == _OF_LEARNER else self._digest(trial, episode)
+            )
+            if found != sha256:
+                raise ValueError(f"trial {trial}, episode {episode}: not as it was written")
+        if finished != {key for key in sealed if key[1] != _OF_LEARNER} or len(states) != len(sealed) - len(finished):
+            raise ValueError("episodes are missing")
 
     def _flatten(self, outcomes: Outcomes) -> list[list[Any]]:
         """One list for each column of `_outcome_columns`."""
@@ -296,13 +380,65 @@ class RunStore:
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
-        self._db.execute("BEGIN IMMEDIATE")
-        try:
-            yield
-        except BaseException:
-            self._db.execute("ROLLBACK")
-            raise
-        self._db.execute("COMMIT")
+        with _explained(self.folder, "what was stored before is whole; then continue with --resume"):
+            try:
+                self._db.execute("BEGIN IMMEDIATE")
+                yield
+                self._db.execute("COMMIT")
+            except BaseException:
+                if self._db.in_transaction:  # a full disk makes SQLite roll back by itself
+                    self._db.execute("ROLLBACK")
+                raise
+
+
+def _connect(folder: Path, path: Path, options: str) -> sqlite3.Connection:
+    """Open a database that need not be there only if `options` say so; a path may hold any character."""
+    if not (path.is_file() or "mode=rwc" in options):
+        raise StoreError(f"{folder / 'run.sqlite'}: is missing")
+    uri = f"file:{quote(os.fsencode(path.absolute()))}?{options}"
+    with _explained(folder):
+        return sqlite3.connect(uri, uri=True, isolation_level=None, timeout=10.0)
+
+
+def _snapshot(folder: Path, held: ExitStack) -> tuple[Path, str]:
+    """What to read: the database itself if all is in it, else a copy of it and of the writer's log."""
+    names = ("run.sqlite", "run.sqlite-wal")
+    log = folder / names[1]
+    if not log.exists() or log.stat().st_size == 0:
+        return folder / names[0], "immutable=1"
+    copy = Path(held.enter_context(tempfile.TemporaryDirectory(prefix="ivl-reading-")))
+    for _ in range(_SNAPSHOT_TRIES):
+        before = [_stamp(folder / name) for name in names]
+        for name in names:
+            shutil.copyfile(folder / name, copy / name)
+        if before == [_stamp(folder / name) for name in names]:
+            return copy / names[0], "mode=rw"
+    raise StoreError(f"{folder}: is written too fast to be read at the moment: try again")
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    status = path.stat()
+    return status.st_mtime_ns, status.st_size
+
+
+@contextmanager
+def _explained(folder: Path, then: str = "") -> Iterator[None]:
+    """Turn what SQLite, or a value that does not fit, says into one line; `then` tells what to do after mending it."""
+    try:
+        yield
+    except (IvlError, sqlite3.IntegrityError, sqlite3.ProgrammingError):
+        raise
+    except sqlite3.Error as error:
+        advice = f" ({_SQLITE_ADVICE[error.sqlite_errorcode & 0xFF]})" if _known(error) else ""
+        raise StoreError(f"{folder / 'run.sqlite'}: {error}{advice}{f'; {then}' if then else ''}") from error
+    except (ValueError, TypeError, OverflowError, KeyError) as error:
+        if then:
+            raise  # what was to be written is the caller's
+        raise StoreError(f"{folder / 'run.sqlite'}: is damaged: {' '.join(str(error).split())[:200]}") from error
+
+
+def _known(error: sqlite3.Error) -> bool:
+    return getattr(error, "sqlite_errorcode", 0) & 0xFF in _SQLITE_ADVICE
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -345,7 +481,7 @@ def check_version(folder: Path | str, manifest: Mapping[str, Any], schema_versio
 
 def write_json(path: Path, data: Any) -> None:
     """Write JSON so that the file is there whole or not at all."""
-    write_durably(path, (json.dumps(data, indent=2, allow_nan=False) + "\n").encode())
+    files.write(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 
 def _outcome_columns(dtype: np.dtype[np.void]) -> dict[str, str]:
@@ -385,12 +521,19 @@ def _episode_row(row: tuple[Any, ...], dim: int) -> EpisodeRow:
 
 def lock_folder(folder: Path) -> int:
     """Keep other processes out; the kernel releases the lock whatever ends this one."""
-    descriptor = os.open(folder / "lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        descriptor = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o644)
+    except OSError as error:
+        raise StoreError(f"{folder}: cannot be written: {files.reason(error)}") from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         os.close(descriptor)
-        raise StoreError(f"{folder}: another process is working on this run") from error
+        if error.errno in (errno.EWOULDBLOCK, errno.EAGAIN):
+            raise StoreError(f"{folder}: another process is working on this run") from error
+        raise StoreError(
+            f"{folder}: cannot be locked: {error.strerror}: put the run folder on a file system that has locks"
+        ) from error
     return descriptor
 
 
@@ -402,29 +545,15 @@ def _clear_unfinished(folder: Path) -> None:
         "run.sqlite-wal",
         "run.sqlite-shm",
         "config.yaml",
-        "config.yaml.part",
-        "manifest.json.part",
         "lock",
+        references.FOLDER,  # its files have names that follow from their content
     }
     if (folder / "manifest.json").exists():
         raise StoreError(f"{folder}: holds a run already: continue it with --resume, or choose another --out")
-    foreign = sorted(path.name for path in folder.iterdir() if path.name not in ours)
+    there = [path.name for path in folder.iterdir()]
+    foreign = sorted(name for name in there if name not in ours and not files.is_leftover(name))
     if foreign:
         raise StoreError(f"{folder}: is not empty ({foreign[0]} ...) and holds no run: choose another --out")
-    for name in ours - {"lock"}:
-        (folder / name).unlink(missing_ok=True)
-
-
-def write_durably(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all, and on the disk when this returns."""
-    part = path.with_name(path.name + ".part")
-    with part.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    for name in there:
+        if name not in ("lock", references.FOLDER):
+            (folder / name).unlink(missing_ok=True)

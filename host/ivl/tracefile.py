@@ -1,14 +1,17 @@
-"""The time series of a rollout as a file: CSV for everything, NPZ for numpy."""
+"""The time series of a rollout as a file: CSV for everything, NPZ for numpy.
 
-import zipfile
+What is read may come from anybody, and passes the border for foreign tables (`ivl.flight.table`).
+"""
+
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ivl import native
+from ivl import files, native
 from ivl.errors import ConfigError
+from ivl.flight import table as border
 
 SUFFIXES = (".csv", ".npz")
 
@@ -39,49 +42,62 @@ def write(path: Path, rows: npt.NDArray[np.void]) -> None:
     check_suffix(path)
     table = columns(rows)
     try:
-        if path.suffix == ".npz":
-            np.savez_compressed(path, **table)  # type: ignore[arg-type]  # one keyword has a type of its own
-            return
-        with path.open("w", encoding="utf-8") as file:
-            file.write(",".join(table) + "\n")
-            for values in zip(*(column.tolist() for column in table.values()), strict=True):
-                file.write(",".join(map(repr, values)) + "\n")
+        with files.replacing(path) as part:
+            _write(part, table)
     except OSError as error:
-        raise ConfigError(f"--trace {path}: cannot be written: {error}") from error
+        raise ConfigError(f"--trace {path}: cannot be written: {files.reason(error)}") from error
+
+
+def _write(path: Path, table: dict[str, npt.NDArray[Any]]) -> None:
+    if path.suffix == ".npz":
+        with path.open("wb") as archive:
+            np.savez_compressed(archive, **table)  # type: ignore[arg-type]  # one keyword has a type of its own
+        return
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(table) + "\n")
+        for values in zip(*(column.tolist() for column in table.values()), strict=True):
+            file.write(",".join(map(repr, values)) + "\n")
+
+
+NEEDED = ("t_s", *(f"{name}_{i + 1}" for name, n in (("p_WB_m", 3), ("v_WB_mps", 3), ("q_WB", 4)) for i in range(n)))
+"""Columns of a trace in which every row has a number; elsewhere NaN stands for what is not known."""
 
 
 def read(path: Path) -> np.recarray[Any, Any]:
     """The rows of a trace as `write` wrote them, a record array of the library's trace table.
 
     Raises:
-        ConfigError: The file cannot be read, or a column is missing or no number.
+        ConfigError: The file cannot be read, a column is missing, a cell is no number, is empty where it is needed, or
+            is not whole where it counts; or times do not rise.
     """
-    check_suffix(path)
-    table = read_columns(path)
+    return rows_of(read_table(path))
+
+
+def rows_of(table: border.Table) -> np.recarray[Any, Any]:
+    """The rows of a table that was read (errors as `read`)."""
     dtype = native.library().trace_dtype
-    rows = np.zeros(len(next(iter(table.values()), ())), dtype=dtype)
+    rows = np.zeros(len(table), dtype=dtype)
     for name, target in columns(rows).items():
-        if name not in table:
-            raise ConfigError(f"{path}: column {name} is missing: this is no trace of `ivl rollout --trace`")
-        target[:] = table[name]
+        table.need([name], "a trace of `ivl rollout --trace`")
+        values = table.numbers(name, name in NEEDED)
+        if target.dtype.kind in "iu":
+            whole = np.iinfo(target.dtype)
+            bad = ~((values >= whole.min) & (values <= whole.max) & (values == np.floor(values)))
+            if bad.any():
+                row = int(np.argmax(bad))
+                raise table.fault(
+                    row, name, f"value {values[row]:g} is no whole number within {whole.min} .. {whole.max}"
+                )
+        target[:] = values
+    border.clock(table, "t_s", 1.0)
     return rows.view(np.recarray)
 
 
-def read_columns(path: Path) -> dict[str, npt.NDArray[np.float64]]:
-    """Every column of a file with one header line (.csv) or of named arrays (.npz).
+def read_table(path: Path) -> border.Table:
+    """A file with one header line (.csv) or of named arrays (.npz), its cells not yet checked.
 
     Raises:
-        ConfigError: The file cannot be read, or holds something else than numbers.
+        ConfigError: The file cannot be read, or is no table.
     """
-    try:
-        if path.suffix == ".npz":
-            with np.load(path) as archive:
-                return {name: archive[name].astype(np.float64) for name in archive.files}
-        with path.open(encoding="utf-8") as file:
-            names = file.readline().strip().split(",")
-            values = np.loadtxt(file, delimiter=",", ndmin=2, dtype=np.float64)
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
-    if values.shape[1] != len(names):
-        raise ConfigError(f"{path}: {len(names)} column names, but {values.shape[1]} numbers in a row")
-    return dict(zip(names, values.T, strict=True))
+    check_suffix(path)
+    return border.read_npz(path) if path.suffix == ".npz" else border.read_csv(path)

@@ -1,14 +1,17 @@
-"""Strict reading of YAML: no duplicate keys, and one line of text for whatever pydantic finds wrong.
+"""The one reader and writer of YAML: every number is what the eye reads, or it is refused.
 
-PyYAML reads `1e-6` as text and `1.0e-6` as a number. Text where a number belongs is refused, with that hint, never
-converted.
+Plain words are read as YAML 1.2's core schema reads them: `1e-6` is a number, `yes`, `off` and `2026-11-30` are text.
+A spelling that YAML 1.1 and 1.2, or the eye, read as different numbers (`060`, `0o17`, `0x1F`, `1_000`, `1:30`) is
+refused. Refused are, too: a key given twice, a key that is no word, tags other than those of the core schema, and
+what is too large, too deep or multiplied by aliases. `dump` writes so that readers of both versions read the same.
 """
 
 import difflib
+import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, TypeVar, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -17,49 +20,212 @@ from pydantic_core import ErrorDetails
 from ivl.errors import ConfigError
 
 Model = TypeVar("Model", bound=BaseModel)
+N_BYTES_MAX = 1_000_000
+N_NODES_MAX = 100_000
+"""Values of a document, each alias counted as all that it stands for."""
+DEPTH_MAX = 40
+DIGITS_MAX = 40
 _NUMBER_AS_TEXT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _N_TOLD = 3
 """So many problems are told; the others are counted."""
 _N_SHOWN = 60
 """So many characters of a value are shown."""
 
+_TAG = "tag:yaml.org,2002:"
+_ODD = "tag:ivl:odd-number"
+_PLAIN = (
+    (f"{_TAG}null", re.compile(r"~|null|Null|NULL|"), ["~", "n", "N", ""]),
+    (f"{_TAG}bool", re.compile(r"true|True|TRUE|false|False|FALSE"), list("tTfF")),
+    (f"{_TAG}int", re.compile(r"[-+]?(0|[1-9][0-9]*)"), list("-+0123456789")),
+    (
+        f"{_TAG}float",
+        re.compile(
+            r"[-+]?(\.[0-9]+|[0-9]+\.[0-9]*|[1-9][0-9]*(?=[eE])|0(?=[eE]))([eE][-+]?[0-9]+)?"
+            r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"
+        ),
+        list("-+0123456789."),
+    ),
+    (
+        _ODD,
+        re.compile(
+            r"[-+]?(0[0-9]+([eE][-+]?[0-9]+)?|0[oO][0-7_]+|0[xX][0-9a-fA-F_]+|0[bB][01_]+"
+            r"|(?=[_.]*[0-9])[0-9_.]*_[0-9_.]*([eE][-+]?[0-9_]+)?|[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?)"
+        ),
+        list("-+0123456789._"),
+    ),
+    (f"{_TAG}merge", re.compile(r"<<"), ["<"]),
+)
 
-class _StrictLoader(yaml.SafeLoader):
-    """SafeLoader that refuses a key given twice in one mapping (plain YAML keeps the last one silently)."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: set[Any] = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if key in seen:
-                raise yaml.constructor.ConstructorError(None, None, f"key {key!r} is given twice", key_node.start_mark)
-            seen.add(key)
-        return super().construct_mapping(node, deep=deep)
+class _Loader(yaml.SafeLoader):
+    """The core schema of YAML 1.2 with merge keys, within limits."""
+
+    yaml_implicit_resolvers: dict[Any, Any] = {}  # noqa: RUF012 - as PyYAML declares it
+    yaml_constructors: ClassVar[dict[Any, Any]] = {}
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = self._n_nodes = 0
+        self._weights: dict[int, int] = {}
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Compose a node unless the document becomes too deep or too large."""
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        self._depth += 1
+        if self._depth > DEPTH_MAX:
+            raise _fault(event, f"nested deeper than {DEPTH_MAX}")
+        node: Any = super().compose_node(parent, index)
+        self._depth -= 1
+        if isinstance(event, yaml.AliasEvent):
+            if id(node) not in self._weights:
+                raise _fault(event, f"*{event.anchor} contains itself")
+            self._n_nodes += self._weights[id(node)]
+        else:
+            self._n_nodes += 1
+        if self._n_nodes > N_NODES_MAX:
+            raise _fault(event, f"more than {N_NODES_MAX} values, aliases counted as what they stand for")
+        return node
+
+    def compose_scalar_node(self, anchor: Any) -> Any:
+        """A single value."""
+        node = super().compose_scalar_node(anchor)
+        self._weights[id(node)] = 1
+        return node
+
+    def compose_sequence_node(self, anchor: Any) -> Any:
+        """A list."""
+        before = self._n_nodes
+        node = super().compose_sequence_node(anchor)
+        self._weights[id(node)] = self._n_nodes - before + 1
+        return node
+
+    def compose_mapping_node(self, anchor: Any) -> Any:
+        """A mapping, whose keys are words, each given once: plain YAML keeps the last one silently."""
+        before, seen = self._n_nodes, set()
+        node: Any = super().compose_mapping_node(anchor)
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise _fault(key, "a key must be a single word")
+            word = self.construct_object(key) if key.tag != f"{_TAG}merge" else "<<"
+            if word in seen:
+                raise _fault(key, f"key {_short(word)} is given twice")
+            seen.add(word)
+        self._weights[id(node)] = self._n_nodes - before + 1
+        return node
+
+
+for _tag, _pattern, _first in _PLAIN:
+    _Loader.add_implicit_resolver(_tag, re.compile(rf"(?:{_pattern.pattern})\Z"), _first)
+
+
+def _fault(node: Any, what: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=what, problem_mark=node.start_mark)
+
+
+def _bool(loader: Any, node: Any) -> bool:
+    text = loader.construct_scalar(node)
+    if text.lower() not in ("true", "false"):
+        raise _fault(node, f"{_short(text)} is neither true nor false")
+    return bool(text.lower() == "true")
+
+
+def _null(loader: Any, node: Any) -> None:
+    if not _PLAIN[0][1].fullmatch(loader.construct_scalar(node)):
+        raise _fault(node, "a null must be empty, null or ~")
+
+
+def _int(loader: Any, node: Any) -> int:
+    text = loader.construct_scalar(node)
+    if not _PLAIN[2][1].fullmatch(text):
+        raise _odd(node, text)
+    if len(text) > DIGITS_MAX:
+        raise _fault(node, f"the number {_short(text)} has more than {DIGITS_MAX} digits")
+    return int(text)
+
+
+def _float(loader: Any, node: Any) -> float:
+    text = loader.construct_scalar(node)
+    if not _PLAIN[3][1].fullmatch(text) and not _PLAIN[2][1].fullmatch(text):
+        raise _odd(node, text)
+    word = text.lower().lstrip("+-")
+    if word in (".inf", ".nan"):
+        return -math.inf if text[0] == "-" else float(word[1:])
+    value = float(text)
+    if math.isinf(value):
+        raise _fault(node, f"the number {_short(text)} is too large (write .inf for infinity)")
+    return value
+
+
+def _refuse_number(loader: Any, node: Any) -> Any:
+    raise _odd(node, loader.construct_scalar(node))
+
+
+def _odd(node: Any, text: str) -> yaml.MarkedYAMLError:
+    what = "a number must be decimal, without leading zeros, underscores or colons; text needs quotes"
+    return _fault(node, f"value {_short(text)} is ambiguous: {what}")
+
+
+def _refuse_tag(loader: Any, node: Any) -> Any:  # noqa: ARG001 - PyYAML's own interface
+    raise _fault(node, f"tag {_short(node.tag)} is not allowed (write the value without it)")
+
+
+for _name, _make in {"bool": _bool, "null": _null, "int": _int, "float": _float}.items():
+    _Loader.add_constructor(f"{_TAG}{_name}", _make)
+_SAFE: Any = yaml.SafeLoader
+for _name in ("str", "seq", "map"):
+    _Loader.add_constructor(f"{_TAG}{_name}", _SAFE.yaml_constructors[f"{_TAG}{_name}"])
+_Loader.add_constructor(f"{_TAG}merge", _SAFE.yaml_constructors[f"{_TAG}str"])
+_Loader.add_constructor(_ODD, _refuse_number)
+_Loader.add_constructor(None, _refuse_tag)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes each text that a reader of YAML 1.1 or of 1.2 would take for something else."""
+
+
+for _tag, _pattern, _first in _PLAIN:
+    _Dumper.add_implicit_resolver(_tag, re.compile(rf"(?:{_pattern.pattern})\Z"), _first)
 
 
 def parse(text: str, label: str) -> Any:
     """Parse YAML text; `label` names it in errors."""
+    if len(text) > N_BYTES_MAX:
+        raise ConfigError(f"{label}: {len(text)} characters (allowed {N_BYTES_MAX})")
     try:
-        return yaml.load(text, Loader=_StrictLoader)
+        return yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         raise ConfigError(f"{label}: {where}{error.problem}") from error
-    except (yaml.YAMLError, TypeError) as error:
+    except (yaml.YAMLError, TypeError, ValueError, RecursionError) as error:
         raise ConfigError(f"{label}: not YAML: {' '.join(str(error).split())}") from error
 
 
 def read(path: Path) -> Any:
-    """Read and parse a YAML file."""
+    """Read and parse a YAML file of UTF-8 text."""
     try:
-        return parse(path.read_text(encoding="utf-8"), path.name)
-    except (OSError, UnicodeDecodeError) as error:
+        size = path.stat().st_size
+        if size > N_BYTES_MAX:
+            raise ConfigError(f"{path}: has {size} bytes (allowed {N_BYTES_MAX})")
+        with path.open("rb") as file:
+            text = file.read(N_BYTES_MAX + 1).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: cannot be read: byte {error.start + 1} is no UTF-8 text") from error
+    except (OSError, ValueError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
+    return parse(text, path.name)
 
 
-def dump(data: Any) -> str:
-    """YAML text of plain data, keys in the given order, floats so that they read back as the same number."""
-    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+def dump(data: Any, width: int = 120, flow: bool | None = False) -> str:
+    """YAML text of plain data, keys in the given order, floats so that they read back as the same number.
+
+    Args:
+        data: Mappings, lists, text, numbers.
+        width: Longest line that is not a single word.
+        flow: Write all in braces (True), nothing (False), or the innermost mappings and lists (None).
+    """
+    options = {"sort_keys": False, "allow_unicode": True, "width": width, "default_flow_style": flow}
+    return str(yaml.dump(data, Dumper=_Dumper, **options))  # type: ignore[call-overload]
 
 
 def validate(model: type[Model], data: Any, label: str) -> Model:
@@ -123,9 +289,9 @@ def explain(error: ValidationError, known: Iterable[str] = ()) -> str:
 
 
 def number_hint(value: Any) -> str:
-    """Advice for a number that YAML took as text; empty for anything else."""
+    """Advice for a number in quotes; empty for anything else."""
     if isinstance(value, str) and _NUMBER_AS_TEXT.fullmatch(value.strip()):
-        return "; YAML reads this as text: write numbers as 1.0e-6, with a point and a signed exponent"
+        return "; in quotes this is text: write the number without them"
     return ""
 
 
@@ -144,5 +310,5 @@ def _complaint(problem: ErrorDetails, known: Iterable[str]) -> str:
 
 def _short(value: Any) -> str:
     """A value as people wrote it, cut where it would hide the rest of the line."""
-    text = repr(value)
+    text = repr(value[: _N_SHOWN + 1] if isinstance(value, (str, list, bytes)) else value)
     return text if len(text) <= _N_SHOWN else f"{text[:_N_SHOWN]}..."

@@ -237,7 +237,6 @@ void ivl_cf_power_off(ivl_cf_t *cf)
 {
     cf->is_on = false;
     cf->text = (ivl_cf_text_t){.n = 0};  // what it had to say
-    cf->n_changed = 0;
 }
 
 void ivl_cf_power_on(ivl_cf_t *cf)

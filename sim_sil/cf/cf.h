@@ -12,7 +12,8 @@
 #include "sim_model.h"
 #include "world_rollout.h"
 
-typedef struct ivl_cf ivl_cf_t;
+typedef struct ivl_cf        ivl_cf_t;
+typedef struct ivl_cf_room_t ivl_cf_room_t;  ///< cf_room.h
 
 // ---- life and time
 
@@ -38,6 +39,13 @@ void ivl_cf_power_on(ivl_cf_t *cf);
 
 /// Last byte of the radio address, which the EEPROM shows; before the vehicle is used.
 void ivl_cf_set_address(ivl_cf_t *cf, uint8_t address);
+
+/// Into a room with others, as its vehicle number n: its start point is apart from theirs.  After ivl_cf_open, before tables are asked for.
+/// @param[in] room  must outlast the vehicle
+void ivl_cf_enter(ivl_cf_t *cf, ivl_cf_room_t *room, size_t n);
+
+/// So much of the room's time has passed while the vehicle stood still: it has not lived through it, the others have.
+void ivl_cf_skip(ivl_cf_t *cf, uint64_t us);
 
 /// Put a deck on, by the name of its parameter without the group: bcFlow2 or bcMultiranger; before tables and memories are asked for.
 /// @return false if there is no such deck
@@ -77,7 +85,8 @@ typedef enum
     IVL_CF_LOG_F32 = 7
 } ivl_cf_log_type_t;
 
-/// The value lies at `address` in the machine's own byte order.  A write copies the bytes there, then calls `changed`, if there is one.
+/// The value lies at `address` in the machine's own byte order.  A write copies the bytes there, then calls `changed`, if there is one.  The
+/// vehicle may change a value by itself.
 /// The default of a parameter is its value after ivl_cf_open.
 typedef struct
 {
@@ -106,9 +115,6 @@ const ivl_cf_log_t   *ivl_cf_logs(const ivl_cf_t *cf, size_t *n);
 
 /// Bring the values behind the log table up to date; before log variables are sampled.
 void ivl_cf_logs_refresh(ivl_cf_t *cf);
-
-/// Parameters that the vehicle itself has changed since the last call, one a call.  @return false if there are no more
-bool ivl_cf_param_take_changed(ivl_cf_t *cf, size_t *index);
 
 // ---- memories
 

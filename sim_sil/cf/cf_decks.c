@@ -40,11 +40,11 @@ static void nearer(double to_m, double slope, double *nearest_m)
 }
 
 /// From the body's origin along a direction in the world.
-static uint16_t look(const ivl_cf_t *cf, const double p_W_m[3], const double b_W[3])
+static uint16_t look(const ivl_cf_t *cf, uint64_t t_us, const double p_W_m[3], const double b_W[3])
 {
-    const double none_m = 2.0 * RANGE_M_MAX, ceiling_m = cf->model.raw.world_ceiling_height_m;
+    const double ceiling_m = cf->model.raw.world_ceiling_height_m;
     const double walls_m[2] = {(double)cf->set.sim.wall_x_m, (double)cf->set.sim.wall_y_m};
-    double       nearest_m = none_m;
+    double       nearest_m = 2.0 * RANGE_M_MAX;
     nearer(ceiling_m - p_W_m[2], b_W[2], &nearest_m);
     nearer(p_W_m[2], -b_W[2], &nearest_m);
     for (int i = 0; i < 2; i++)
@@ -55,46 +55,50 @@ static uint16_t look(const ivl_cf_t *cf, const double p_W_m[3], const double b_W
             nearer(walls_m[i] + p_W_m[i], -b_W[i], &nearest_m);
         }
     }
-    if (nearest_m < none_m)
+    ivl_cf_neighbours_look(cf, t_us, p_W_m, b_W, &nearest_m);
+    if (nearest_m <= RANGE_M_MAX)
     {
         return (uint16_t)(nearest_m * 1000.0 + 0.5);
     }
     return NOTHING_MM;
 }
 
-static uint16_t measure(const ivl_cf_t *cf, ivl_cf_direction_t direction)
+static uint16_t measure(const ivl_cf_t *cf, uint64_t t_us, const ivl_sim_kin_t *kin, ivl_cf_direction_t direction)
 {
     static const double AXES[IVL_CF_DIRECTIONS][3] = {
         [IVL_CF_FRONT] = {1.0, 0.0, 0.0},  [IVL_CF_BACK] = {-1.0, 0.0, 0.0}, [IVL_CF_LEFT] = {0.0, 1.0, 0.0},
         [IVL_CF_RIGHT] = {0.0, -1.0, 0.0}, [IVL_CF_UP] = {0.0, 0.0, 1.0},    [IVL_CF_DOWN] = {0.0, 0.0, -1.0},
     };
-    const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
-    const ivl_rot_t     R = ivl_rot_from_quat(kin.q_WB);
-    const double       *b = AXES[direction];
-    double              b_W[3];
+    const ivl_rot_t R = ivl_rot_from_quat(kin->q_WB);
+    const double   *b = AXES[direction];
+    double          b_W[3];
     for (int i = 0; i < 3; i++)
     {
         b_W[i] = R.row[i].x * b[0] + R.row[i].y * b[1] + R.row[i].z * b[2];
     }
-    return look(cf, kin.p_WB_m, b_W);
+    return look(cf, t_us, kin->p_WB_m, b_W);
 }
 
-/// Upwards also without the deck: there the world may have a ranging sensor of its own, which the app is given instead.
+/// Upwards also without the deck: there the world may have a ranging sensor of its own, which the app is given instead.  What was seen is
+/// worked out when it is told, so that other vehicles of the room have been stepped to that time, whichever is stepped first.
 static void range(ivl_cf_t *cf)
 {
     const bool has_deck = cf->set.has_ranger_deck != 0u;
+    if (cf->t_ms % RANGER_MS == RANGER_MS - RANGER_AGE_MS)
+    {
+        cf->range_begun = true;
+        cf->range_from_us = ivl_cf_room_us(cf);
+        cf->range_from = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
+    }
+    if (cf->t_ms % RANGER_MS != 0 || !cf->range_begun)
+    {
+        return;
+    }
     for (int d = IVL_CF_FRONT; d <= IVL_CF_UP; d++)
     {
         if (d == IVL_CF_UP ? !cf->has_range : has_deck)
         {
-            if (cf->t_ms % RANGER_MS == RANGER_MS - RANGER_AGE_MS)
-            {
-                cf->range_next_mm[d] = measure(cf, (ivl_cf_direction_t)d);
-            }
-            if (cf->t_ms % RANGER_MS == 0)
-            {
-                cf->range_mm[d] = cf->range_next_mm[d];
-            }
+            cf->range_mm[d] = measure(cf, cf->range_from_us, &cf->range_from, (ivl_cf_direction_t)d);
         }
     }
 }
@@ -131,7 +135,8 @@ void ivl_cf_decks_step(ivl_cf_t *cf)
     }
     if (cf->t_ms % DOWN_MS == 0)
     {
-        cf->range_mm[IVL_CF_DOWN] = measure(cf, IVL_CF_DOWN);
+        const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
+        cf->range_mm[IVL_CF_DOWN] = measure(cf, ivl_cf_room_us(cf), &kin, IVL_CF_DOWN);
     }
     if (cf->t_ms % FLOW_MS == 0)
     {
@@ -143,8 +148,9 @@ void ivl_cf_decks_boot(ivl_cf_t *cf)
 {
     for (int d = 0; d < IVL_CF_DIRECTIONS; d++)
     {
-        cf->range_mm[d] = cf->range_next_mm[d] = NOTHING_MM;
+        cf->range_mm[d] = NOTHING_MM;
     }
+    cf->range_begun = false;
 }
 
 // ---- which ones, and how clients know them

@@ -139,7 +139,6 @@ static bool tester_write(uint32_t address, uint32_t size, const uint8_t *bytes)
     {
         THE.set.tester_reset = 0;
         THE.tester_errors = 0;
-        ivl_cf_param_changed(&THE, &THE.set.tester_reset);
     }
     for (uint32_t i = 0; i < size; i++)
     {

@@ -292,6 +292,7 @@
     LIVE(U8,  sil, ended,    N, cf->episode.ended) \
     LIVE(U8,  sil, grounded, N, cf->grounded ? 1u : 0u) \
     LIVE(U32, sil, n_pose,   N, cf->estimate.n) \
+    LIVE(U32, sil, n_bumps,  N, cf->n_bumps) \
     LIVE(F32, stateEstimate, x,  C, in->p_WB_m.x) \
     LIVE(F32, stateEstimate, y,  C, in->p_WB_m.y) \
     LIVE(F32, stateEstimate, z,  C, in->p_WB_m.z) \

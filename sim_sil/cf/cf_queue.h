@@ -1,5 +1,5 @@
 /// @file cf_queue.h
-/// What waits between vehicle and server: text, packets of the app channel, numbers of parameters that have changed.
+/// What waits between vehicle and server: text, packets of the app channel.
 #ifndef IVL_CF_QUEUE_H
 #define IVL_CF_QUEUE_H
 #include <stdbool.h>
@@ -10,8 +10,7 @@ enum
 {
     IVL_CF_TEXT_MAX = 2048,
     IVL_CF_PACKETS_MAX = 64,  ///< out; in there are as many as the firmware has
-    IVL_CF_PACKETS_IN_MAX = 10,
-    IVL_CF_CHANGED_MAX = 32
+    IVL_CF_PACKETS_IN_MAX = 10
 };
 
 /// Bytes in order; what does not fit is left out.

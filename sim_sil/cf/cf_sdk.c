@@ -182,6 +182,32 @@ unsigned int paramGetUint(paramVarId_t varid)
     return known ? *(const uint8_t *)params[varid.id].address : 0u;
 }
 
+static void *address_of(paramVarId_t varid, ivl_cf_param_type_t type)
+{
+    size_t                n;
+    const ivl_cf_param_t *params = ivl_cf_params(&ivl_cf_the, &n);
+    return (varid.id < n && params[varid.id].type == type) ? params[varid.id].address : NULL;
+}
+
+/// The server sees by itself what has changed.  Of parameters of one byte, as above.
+void paramSetInt(paramVarId_t varid, int valuei)
+{
+    uint8_t *const at = address_of(varid, IVL_CF_PARAM_U8);
+    if (at != NULL)
+    {
+        *at = (uint8_t)valuei;
+    }
+}
+
+void paramSetFloat(paramVarId_t varid, float valuef)
+{
+    void *const at = address_of(varid, IVL_CF_PARAM_F32);
+    if (at != NULL)
+    {
+        memcpy(at, &valuef, sizeof valuef);
+    }
+}
+
 // ---- memories
 
 static const MemoryHandlerDef_t *handler;

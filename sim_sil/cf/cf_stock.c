@@ -84,6 +84,12 @@ static void want_xy(ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sampl
         ref->a_W_mps2 = limited(sp->a_W_mps2);
         return;
     }
+    if (sp->in_body)
+    {
+        // the velocity turns with the vehicle: without this the law, which lags behind a point on a circle, flies a larger one
+        const float turn_radps = now->w_B_radps.z;
+        ref->a_W_mps2 = limited(ivl_vec3(-turn_radps * ref->v_W_mps.y, turn_radps * ref->v_W_mps.x, 0.0f));
+    }
     stock->p_W_m.x = drawn_along(stock->p_W_m.x, ref->v_W_mps.x, dt_s, now->p_WB_m.x);
     stock->p_W_m.y = drawn_along(stock->p_W_m.y, ref->v_W_mps.y, dt_s, now->p_WB_m.y);
 }
@@ -116,14 +122,19 @@ static void begin(ivl_cf_stock_t *stock, const ivl_sample_t *now)
 
 // ---- the law
 
-/// Seen from axes turned by the wanted heading, where the law wants heading 0.
-static ivl_wrench_t wrench(const ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sample_t *now, const ivl_reference_t *ref)
+/// Seen from axes turned by the wanted heading, where the law wants heading 0.  They turn, too: a vehicle that turns with them is at rest.
+/// @param[in] turn_radps  of these axes
+static ivl_wrench_t wrench(const ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sample_t *now, const ivl_reference_t *ref,
+                           float turn_radps)
 {
+    const ivl_axes_t   axes = ivl_axes_of(now->q_WB);
+    const ivl_vec3_t   up_B = {axes.x.z, axes.y.z, axes.z.z};
     const ivl_sincos_t full = ivl_sincos(stock->yaw_rad), half = ivl_sincos(0.5f * stock->yaw_rad);
     const ivl_quat_t   q = now->q_WB;
     ivl_sample_t       sample = *now;
     sample.p_WB_m = turned(now->p_WB_m, full.cos, -full.sin);
     sample.v_WB_mps = turned(now->v_WB_mps, full.cos, -full.sin);
+    sample.w_B_radps = ivl_sub(now->w_B_radps, ivl_scale(up_B, turn_radps));
     sample.q_WB = (ivl_quat_t){
         half.cos * q.x + half.sin * q.y,
         half.cos * q.y - half.sin * q.x,
@@ -157,7 +168,7 @@ void ivl_cf_stock_step(ivl_cf_stock_t *stock, const ivl_cfg_t *cfg, const ivl_sa
     want_xy(stock, cfg, now, sp, dt_s, &ref);
     want_z(stock, now, sp, dt_s, &ref);
     ref.p_W_m = stock->p_W_m;
-    ivl_wrench_t asked = wrench(stock, cfg, now, &ref);
+    ivl_wrench_t asked = wrench(stock, cfg, now, &ref, (sp->yaw == IVL_CF_MODE_VELOCITY) ? sp->yawrate_radps : 0.0f);
     if (sp->z == IVL_CF_MODE_OFF)
     {
         asked.thrust_N = 4.0f * cfg->motor_thrust_N_max * ivl_clamp(sp->thrust_norm, 0.0f, 1.0f);

@@ -31,7 +31,6 @@ static void reset_written(void)
     {
         THE.set.sim.reset = 0;
         ivl_cf_world_reset(&THE);
-        ivl_cf_param_changed(&THE, &THE.set.sim.reset);
     }
 }
 
@@ -40,7 +39,6 @@ static void start_written(void)
     if (THE.set.sim.start >= IVL_SIM_START_STATE && THE.set.sim.start != IVL_CF_START_AS_FLOWN)
     {
         THE.set.sim.start = IVL_CF_START_AS_FLOWN;
-        ivl_cf_param_changed(&THE, &THE.set.sim.start);
     }
 }
 
@@ -74,10 +72,6 @@ static void controller_written(void)
             controllerOutOfTreeInit();
         }
     }
-    if (THE.set.controller != asked)
-    {
-        ivl_cf_param_changed(&THE, &THE.set.controller);
-    }
     if (THE.runs_stock && asked != IVL_CF_CONTROLLER_STOCK)
     {
         ivl_cf_print("CONTROLLER: %u flies the simulated stock law; its own gains change nothing\n", (unsigned)asked);
@@ -91,7 +85,6 @@ static void estimation_written(void)
     {
         THE.set.reset_estimation = 0;
         ivl_cf_begin_estimate(&THE);
-        ivl_cf_param_changed(&THE, &THE.set.reset_estimation);
     }
 }
 
@@ -122,7 +115,6 @@ static void system_written(void)
         if (*asked[i] != 0u)
         {
             *asked[i] = 0;
-            ivl_cf_param_changed(&THE, asked[i]);
         }
     }
 }
@@ -133,7 +125,6 @@ static void place_written(void)
     {
         THE.set.sim.place = 0;
         ivl_cf_world_place(&THE);
-        ivl_cf_param_changed(&THE, &THE.set.sim.place);
     }
 }
 
@@ -343,27 +334,4 @@ const ivl_cf_log_t *ivl_cf_logs(const ivl_cf_t *cf, size_t *n)
     (void)cf;
     *n = n_logs;
     return all_logs;
-}
-
-// ---- changes
-
-void ivl_cf_param_changed(ivl_cf_t *cf, const void *address)
-{
-    for (size_t i = 0; i < n_params && cf->n_changed < IVL_CF_CHANGED_MAX; i++)
-    {
-        if (all_params[i].address == address)
-        {
-            cf->changed[cf->n_changed++] = i;
-        }
-    }
-}
-
-bool ivl_cf_param_take_changed(ivl_cf_t *cf, size_t *index)
-{
-    if (cf->n_changed == 0)
-    {
-        return false;
-    }
-    *index = cf->changed[--cf->n_changed];
-    return true;
 }

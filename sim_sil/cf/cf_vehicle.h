@@ -9,6 +9,7 @@
 #include "cf_planner.h"
 #include "cf_power.h"
 #include "cf_queue.h"
+#include "cf_room.h"
 #include "cf_stock.h"
 #include "cf_supervisor.h"
 #include "sim_autopilot.h"
@@ -123,6 +124,11 @@ struct ivl_cf
     uint64_t            zero_us;  ///< vehicle time at which the world's clock was 0
     uint64_t            n_reset;
     bool                grounded;  ///< rests on the floor
+    ivl_cf_room_t      *room;      ///< with other vehicles; NULL: it is alone
+    size_t              room_seat;
+    uint64_t            skipped_us;                      ///< of the room's time
+    uint32_t            n_bumps;                         ///< with other vehicles
+    uint64_t            apart_us[IVL_CF_ROOM_VEHICLES];  ///< of each of them: no bump before that, in the room's time
     bool                link_up;
     bool                runs_stock;  ///< the stock controller is selected
     uint64_t            app_wake_ms;
@@ -146,17 +152,17 @@ struct ivl_cf
     float               acc_g[3];    ///< filtered
     float               motor_N[4];  ///< commands of the last tick
     float               variance_m2;
-    bool                has_range;                         ///< the world has a ranging sensor
-    uint16_t            range_mm[IVL_CF_DIRECTIONS];       ///< last readings
-    uint16_t            range_next_mm[IVL_CF_DIRECTIONS];  ///< measured, not yet told
-    int16_t             flow_pixels[2];                    ///< deltaX, deltaY of the flow sensor
+    bool                has_range;                    ///< the world has a ranging sensor
+    uint16_t            range_mm[IVL_CF_DIRECTIONS];  ///< last readings
+    bool                range_begun;                  ///< the multi-ranger measures from there
+    uint64_t            range_from_us;                ///< in the room's time
+    ivl_sim_kin_t       range_from;
+    int16_t             flow_pixels[2];  ///< deltaX, deltaY of the flow sensor
     uint8_t             eeprom[IVL_CF_EEPROM_BYTES];
     uint8_t             one_wire[IVL_CF_DECKS][IVL_CF_ONE_WIRE_BYTES];  ///< of the decks that are on
     uint32_t            tester_errors;  ///< bytes written to the memory tester that were not those it expects
     ivl_cf_text_t       text;
     ivl_cf_packets_t    to_app, from_app;
-    size_t              changed[IVL_CF_CHANGED_MAX];
-    size_t              n_changed;
 };
 
 /// The vehicle of this process.
@@ -202,6 +208,20 @@ void ivl_cf_world_reset(ivl_cf_t *cf);
 /// Taken by hand from wherever it is, and put down upright on the floor below, its heading kept; what it flew is over.
 void ivl_cf_world_place(ivl_cf_t *cf);
 
+// ---- cf_neighbours.c: nothing happens where a vehicle is alone
+
+/// Time that the vehicles of a room share.
+uint64_t ivl_cf_room_us(const ivl_cf_t *cf);
+
+/// Where the vehicle is, for the others.  At each tick of the world.
+void ivl_cf_neighbours_tell(ivl_cf_t *cf);
+
+/// Another vehicle in the cone of a distance sensor that looks along b_W, if it is nearer than *nearest_m.
+void ivl_cf_neighbours_look(const ivl_cf_t *cf, uint64_t t_us, const double p_W_m[3], const double b_W[3], double *nearest_m);
+
+/// Running into others.  Between two ticks.
+void ivl_cf_neighbours_bump(ivl_cf_t *cf);
+
 // ---- cf_decks.c
 
 /// Nothing has been measured yet.
@@ -240,9 +260,6 @@ bool ivl_cf_tables_open(ivl_cf_t *cf);
 
 /// Held parameters have their first values.
 void ivl_cf_tables_boot(ivl_cf_t *cf);
-
-/// The vehicle has changed a parameter of its own.
-void ivl_cf_param_changed(ivl_cf_t *cf, const void *address);
 
 // ---- cf_sdk.c
 

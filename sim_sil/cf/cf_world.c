@@ -175,6 +175,8 @@ void ivl_cf_world_tick(ivl_cf_t *cf)
         move(cf);
         ivl_cf_episode_look(cf);
         find_floor(cf);
+        ivl_cf_neighbours_tell(cf);
+        ivl_cf_neighbours_bump(cf);
     }
     const ivl_phase_t before = app_core_state()->phase;
     ivl_sim_world_tick(&cf->group, IVL_CF_LANE);

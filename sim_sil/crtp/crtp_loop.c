@@ -283,7 +283,10 @@ static void advance(ivl_crtp_loop_t *loop)
     for (int i = 0; (i < STEPS_A_TURN) && may_send(loop); i++)
     {
         const uint64_t vehicle_us = ivl_cf_time_us(crtp->cf);
-        if (vehicle_us + 1000u > ivl_crtp_time_target_us(&crtp->own.time, loop->now_us, vehicle_us))
+        const uint64_t target_us = ivl_crtp_time_target_us(&crtp->own.time, loop->now_us, vehicle_us);
+        ivl_cf_skip(crtp->cf, crtp->own.time.skipped_us);
+        crtp->own.time.skipped_us = 0;
+        if (vehicle_us + 1000u > target_us)
         {
             return;
         }

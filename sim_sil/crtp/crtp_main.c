@@ -6,12 +6,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #ifdef __linux__
 #include <sys/prctl.h>
 #endif
 
+#include "cf/cf_room.h"
 #include "crtp_list.h"
 #include "crtp_loop.h"
 #include "crtp_model_file.h"
@@ -21,7 +23,7 @@
 
 enum
 {
-    VEHICLES_MAX = 64
+    VEHICLES_MAX = IVL_CF_ROOM_VEHICLES
 };
 
 typedef struct
@@ -29,6 +31,9 @@ typedef struct
     int      fd, control_fd;
     uint16_t port, control_port;
 } endpoint_t;
+
+/// Shared by the processes of several vehicles; NULL: there is one, alone.
+static ivl_cf_room_t *room;
 
 static const unsigned RADIO_ADDRESS = 0xE7;  // last byte of the first vehicle's
 static const char     USUAL_DECK[] = "bcFlow2";
@@ -112,6 +117,10 @@ static ivl_cf_t *make_vehicle(const ivl_crtp_options_t *o, const ivl_sim_model_t
         return NULL;
     }
     ivl_cf_set_address(cf, (uint8_t)(RADIO_ADDRESS + n));
+    if (room != NULL)
+    {
+        ivl_cf_enter(cf, room, n);
+    }
     for (unsigned i = 0; i < o->n_decks; i++)
     {
         (void)ivl_cf_attach(cf, o->deck[i]);  // "none" is no deck
@@ -255,6 +264,18 @@ static int watch(pid_t *children, unsigned n, const sigset_t *mask)
     return code;
 }
 
+static bool open_room(unsigned n)
+{
+    void *memory = mmap(NULL, sizeof *room, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (memory == MAP_FAILED)
+    {
+        return fail(strerror(errno));
+    }
+    room = memory;
+    room->n = n;
+    return true;
+}
+
 static int fly_all(const ivl_crtp_options_t *o, const ivl_sim_model_t *model, const endpoint_t *endpoints)
 {
     pid_t    children[VEHICLES_MAX] = {0};
@@ -262,6 +283,10 @@ static int fly_all(const ivl_crtp_options_t *o, const ivl_sim_model_t *model, co
     if (o->vehicles == 1u)
     {
         return fly(o, model, 0, endpoints);
+    }
+    if (!open_room(o->vehicles))
+    {
+        return 1;
     }
     sigemptyset(&held);
     sigaddset(&held, SIGINT);

@@ -18,7 +18,7 @@ static const char HELP[] =
     "  --model FILE      parameters of vehicle, gear and world, as `ivl sil --write-model` writes them; - is the standard input\n"
     "  --port N          UDP port of the first vehicle (19850; tools scan 19850 .. 19859); 0 takes a free one\n"
     "  --bind ADDRESS    address to listen on (127.0.0.1: this machine only; 0.0.0.0: everybody who can reach it may fly)\n"
-    "  --vehicles N      so many vehicles on consecutive ports, a process each (1 .. 64)\n"
+    "  --vehicles N      so many vehicles in one room, on consecutive ports, a process each (1 .. 64)\n"
     "  --seed N          of the sensors' noise (0); vehicle n has seed N + n\n"
     "  --deck NAME       a deck on board, bcFlow2 or bcMultiranger; may be given several times; none: no deck (bcFlow2)\n"
     "  --tables          print all parameters and log variables, one a line, and stop\n"

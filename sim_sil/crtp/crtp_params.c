@@ -8,6 +8,7 @@
 
 enum
 {
+    LOOK_MS = 100,  // so often the vehicle's own changes are looked for; what follows from a write is told at once
     CODE_EXTENDED = 0x10,
     CODE_CORE = 0x20,
     CODE_READ_ONLY = 0x40
@@ -64,6 +65,16 @@ void ivl_crtp_params_take_defaults(ivl_crtp_t *crtp)
     {
         const ivl_cf_param_t *row = &crtp->params.rows[i];
         memcpy(crtp->params.state[i].start, row->address, ivl_crtp_param_size(row->type));
+    }
+    ivl_crtp_params_forget(crtp);
+}
+
+void ivl_crtp_params_forget(ivl_crtp_t *crtp)
+{
+    for (uint16_t i = 0; i < crtp->params.toc.n; i++)
+    {
+        const ivl_cf_param_t *row = &crtp->params.rows[i];
+        memcpy(crtp->params.state[i].told, row->address, ivl_crtp_param_size(row->type));
     }
 }
 
@@ -126,6 +137,8 @@ bool ivl_crtp_params_write(ivl_crtp_t *crtp, uint16_t id, const uint8_t *value)
 {
     const ivl_cf_param_t *row = &crtp->params.rows[id];
     memcpy(row->address, value, ivl_crtp_param_size(row->type));
+    memcpy(crtp->params.state[id].told, value, ivl_crtp_param_size(row->type));
+    crtp->params.written = true;
     if (id >= crtp->params.n_vehicle)
     {
         return own_written(crtp, id);
@@ -223,6 +236,7 @@ static void handle_write(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet)
 typedef enum
 {
     SET_BY_NAME = 0,
+    VALUE_CHANGED = 1,
     EXTENDED_TYPE = 2,
     STORE = 3,
     GET_STATE = 4,
@@ -326,6 +340,7 @@ static ivl_crtp_error_t answer(ivl_crtp_t *crtp, command_t command, uint16_t id,
         ivl_crtp_put_u8(reply, IVL_CRTP_OK);
         break;
     case SET_BY_NAME:
+    case VALUE_CHANGED:
     default:
         return IVL_CRTP_ENOEXEC;
     }
@@ -387,16 +402,31 @@ void ivl_crtp_params_handle(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet)
     }
 }
 
+static void tell(ivl_crtp_t *crtp, uint16_t id)
+{
+    const ivl_cf_param_t *row = &crtp->params.rows[id];
+    ivl_crtp_packet_t     event = ivl_crtp_packet(IVL_CRTP_PORT_PARAM, 3);
+    ivl_crtp_put_u8(&event, VALUE_CHANGED);
+    ivl_crtp_put_u16(&event, id);
+    ivl_crtp_put_bytes(&event, row->address, ivl_crtp_param_size(row->type));
+    ivl_crtp_send(crtp, &event);
+}
+
 void ivl_crtp_params_step(ivl_crtp_t *crtp)
 {
-    size_t i;
-    while (ivl_cf_param_take_changed(crtp->cf, &i))
+    ivl_crtp_params_t *p = &crtp->params;
+    if (!p->written && (ivl_crtp_time_ms(crtp) % LOOK_MS != 0u))
     {
-        const ivl_cf_param_t *row = &crtp->params.rows[i];
-        ivl_crtp_packet_t     event = ivl_crtp_packet(IVL_CRTP_PORT_PARAM, 3);
-        ivl_crtp_put_u8(&event, 1);
-        ivl_crtp_put_u16(&event, (uint16_t)i);
-        ivl_crtp_put_bytes(&event, row->address, ivl_crtp_param_size(row->type));
-        ivl_crtp_send(crtp, &event);
+        return;
+    }
+    p->written = false;
+    for (uint16_t i = 0; i < p->toc.n; i++)
+    {
+        const size_t size = ivl_crtp_param_size(p->rows[i].type);
+        if (memcmp(p->state[i].told, p->rows[i].address, size) != 0)
+        {
+            memcpy(p->state[i].told, p->rows[i].address, size);
+            tell(crtp, i);
+        }
     }
 }

@@ -12,7 +12,12 @@ void ivl_crtp_params_take_defaults(ivl_crtp_t *crtp);
 
 /// Stored values of persistent parameters take effect, as after power-on.
 void ivl_crtp_params_restore(ivl_crtp_t *crtp);
+
+/// Clients start anew: what the values are now needs not be told them.
+void ivl_crtp_params_forget(ivl_crtp_t *crtp);
 void ivl_crtp_params_handle(ivl_crtp_t *crtp, const ivl_crtp_packet_t *packet);
+
+/// Tells the client which values have changed other than by his own writing.
 void ivl_crtp_params_step(ivl_crtp_t *crtp);
 
 /// Copies a value into a parameter and tells who must know.  @return true if the answer has to wait

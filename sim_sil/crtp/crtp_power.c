@@ -37,6 +37,7 @@ static void on(ivl_crtp_t *crtp)
         crtp->is_off = false;
         ivl_cf_power_on(crtp->cf);
         ivl_crtp_params_restore(crtp);
+        ivl_crtp_params_forget(crtp);
     }
 }
 

@@ -46,6 +46,7 @@ typedef struct
     bool    stored;
     uint8_t start[IVL_CRTP_VALUE_BYTES];  ///< default
     uint8_t kept[IVL_CRTP_VALUE_BYTES];   ///< in persistent memory
+    uint8_t told[IVL_CRTP_VALUE_BYTES];   ///< what clients take it to be
 } ivl_crtp_param_state_t;
 
 typedef struct
@@ -55,6 +56,7 @@ typedef struct
     ivl_cf_param_t         *rows;
     ivl_crtp_param_state_t *state;
     size_t                  n_vehicle;  ///< the first are the vehicle's, the others the server's own
+    bool                    written;    ///< since they were compared with what clients take them to be
 } ivl_crtp_params_t;
 
 typedef struct ivl_crtp ivl_crtp_t;

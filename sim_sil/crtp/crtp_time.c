@@ -48,6 +48,7 @@ uint64_t ivl_crtp_time_target_us(ivl_crtp_time_t *time, uint64_t wall_us, uint64
     if (slipped || !time->anchored)
     {
         time->n_slipped += slipped ? 1u : 0u;
+        time->skipped_us += slipped ? paced_us(time, wall_us) - vehicle_us : 0u;
         time->anchored = true;
         time->wall_us = wall_us;
         time->vehicle_us = vehicle_us;

@@ -23,6 +23,7 @@ typedef struct
     bool     anchored;
     uint64_t wall_us, vehicle_us;  ///< paced: these two belong together
     uint32_t n_slipped;            ///< times that the process was too late to catch up
+    uint64_t skipped_us;           ///< vehicle time that was left out then, since the reader last set it to 0
 } ivl_crtp_time_t;
 
 /// The parameters have been written: start from here.

@@ -137,10 +137,6 @@ ivl_sim_thrust_t ivl_sim_rotor_step(const ivl_sim_model_t *model, ivl_sim_rotor_
 {
     const ivl_sim_params_t *raw = &model->raw;
     ivl_sim_thrust_t        load = {0.0, {0.0, 0.0, 0.0}};
-    if (ivl_sim_rotor_still(rotor))
-    {
-        return load;
-    }
     if (!(dt_s > 0.0))
     {
         dt_s = 1.0e-9;  // an evaluation without motion: the thrust of this instant

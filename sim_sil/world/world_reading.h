@@ -9,7 +9,7 @@
 
 enum
 {
-    IVL_SIM_READING_QUEUE = 32,  ///< samples under way: more than delay_max * rate_max
+    IVL_SIM_READING_QUEUE = 64,  ///< samples under way: more than delay_max * rate_max
     IVL_SIM_READINGS_MAX = 8     ///< rows of a table
 };
 

@@ -108,28 +108,19 @@ static void accept(ivl_sim_group_t *group, int lane, bool diverged)
     world_grow_step(w, &group->next, &group->rate, lane);
 }
 
-/// state = next and last = rate, in the lanes where the step stands.
+/// state = next and last = rate, in the lanes where the step stands.  Most stand, so the few others are put back, and then all are copied.
 static void commit(ivl_sim_group_t *group, const bool stands[IVL_SIM_LANES])
 {
-    bool all = true;
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        all = all && stands[lane];
-    }
-    if (all)
-    {
-        group->state = group->next;
-        group->last = group->rate;
-        return;
-    }
-    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
-    {
-        if (stands[lane])
+        if (!stands[lane])
         {
-            ivl_sim_state_lane_copy(&group->state, &group->next, lane);
-            ivl_sim_rate_lane_copy(&group->last, &group->rate, lane);
+            ivl_sim_state_lane_copy(&group->next, &group->state, lane);
+            ivl_sim_rate_lane_copy(&group->rate, &group->last, lane);
         }
     }
+    group->state = group->next;
+    group->last = group->rate;
 }
 
 bool ivl_sim_world_ready(const ivl_sim_group_t *group, int lane)

@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from ivl.analysis.intervals import Estimate, difference, share_of, stratified_mean, wilson
+from ivl.analysis.intervals import (
+    Estimate,
+    difference,
+    share_of,
+    share_of_clusters,
+    stratified_mean,
+    student95,
+    wilson,
+)
 
 
 @pytest.mark.parametrize(
@@ -54,6 +62,79 @@ def test_share_of_nothing_is_unknown() -> None:
     assert np.isnan(nothing.value)
     assert (nothing.low, nothing.high, nothing.n) == (0.0, 1.0, 0)
     assert share_of([True, True, False, False]).value == 0.5
+
+
+def crossed(rng: np.random.Generator, n_vehicles: int, n_approaches: int, bad: float) -> np.ndarray:
+    """Landings of vehicles on the same approaches; both differ in how easy they are, and a share of vehicles is bad."""
+    vehicle = rng.normal(0.0, 1.2, (n_vehicles, 1)) - 4.0 * (rng.random((n_vehicles, 1)) < bad)
+    approach = rng.normal(0.0, 1.2, (1, n_approaches))
+    return np.asarray(rng.random((n_vehicles, n_approaches)) < 1 / (1 + np.exp(-1.0 - vehicle - approach)))
+
+
+@pytest.mark.parametrize("shape", [(6, 200), (20, 40), (20, 400), (8, 8)])
+@pytest.mark.parametrize("bad", [0.0, 0.2])
+def test_a_share_of_crossed_clusters_covers_where_that_of_flights_does_not(shape: tuple[int, int], bad: float) -> None:
+    rng = np.random.default_rng(1)
+    truth = crossed(rng, 4000, 500, bad).mean()
+    vehicle, approach = np.indices(shape)
+    inside = {"clusters": 0, "flights": 0}
+    n = 400
+    for _ in range(n):
+        landed = crossed(rng, *shape, bad)
+        found = {
+            "clusters": share_of_clusters(landed, np.ones(shape), vehicle, approach),
+            "flights": share_of(landed),
+        }
+        for name, of in found.items():
+            inside[name] += of.low <= truth <= of.high
+    assert inside["clusters"] / n > 0.92
+    assert inside["flights"] / n < 0.75
+
+
+def test_a_share_of_some_flights_of_clusters_covers() -> None:
+    """As the strikes that are avoided: a share of flights whose number differs from vehicle to vehicle."""
+    rng = np.random.default_rng(2)
+
+    def drawn(n_vehicles: int) -> tuple[np.ndarray, np.ndarray]:
+        rate, share = rng.beta(1.0, 2.0, (2, n_vehicles, 1))
+        counted = rng.random((n_vehicles, 100)) < rate
+        return counted & (rng.random((n_vehicles, 100)) < 1 - 0.5 * share), counted
+
+    happened, counted = drawn(40_000)
+    truth = happened.sum() / counted.sum()
+    vehicle, approach = np.indices((12, 100))
+    inside = 0
+    for _ in range(400):
+        found = share_of_clusters(*drawn(12), vehicle, approach)
+        inside += found.low <= truth <= found.high
+    assert inside / 400 > 0.92
+
+
+def test_answers_that_have_a_cluster_each_are_independent() -> None:
+    landed = np.arange(50) % 3 == 0
+    assert share_of_clusters(landed, np.ones(50), np.arange(50)) == share_of(landed)
+    doubled = share_of_clusters(np.tile(landed, 2), np.ones(100), np.tile(np.arange(50), 2))
+    alone = share_of(landed)
+    # the same answers once more tell nothing new
+    assert (doubled.low, doubled.high) == pytest.approx((alone.low, alone.high), abs=0.01)
+    assert doubled.n == 100
+
+
+def test_clusters_that_are_few_or_all_the_same_count_as_one_answer_each() -> None:
+    vehicle, approach = np.indices((3, 100))
+    few = share_of_clusters(approach % 2 == 0, np.ones((3, 100)), vehicle)
+    assert (few.low, few.high) == tuple(float(end) for end in wilson(0.5, 3))
+    vehicle, _ = np.indices((20, 100))
+    perfect = share_of_clusters(np.ones((20, 100)), np.ones((20, 100)), vehicle)
+    assert perfect.low == pytest.approx(float(wilson(1.0, 20)[0]))
+    nothing = share_of_clusters(np.ones(5), np.zeros(5), np.arange(5))
+    assert np.isnan(nothing.value)
+    assert (nothing.low, nothing.high, nothing.n) == (0.0, 1.0, 0)
+
+
+@pytest.mark.parametrize(("freedom", "wanted"), [(3, 3.182), (5, 2.571), (11, 2.201), (19, 2.093), (1000, 1.962)])
+def test_quantiles_of_students_t_are_the_published_ones(freedom: int, wanted: float) -> None:
+    assert student95(freedom) == pytest.approx(wanted, rel=0.01)
 
 
 def test_stratified_mean_weighs_cells_equally_and_knows_its_error() -> None:

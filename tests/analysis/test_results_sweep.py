@@ -1,16 +1,14 @@
 """The program that writes the campaign's part of docs/RESULTS.md, and the part that is committed."""
 
-import importlib.util
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 
 import marked
 import numpy as np
 import pandas as pd
 import pytest
+import results_sweep as tool
 
 from ivl.analysis import campaign_text, compact, moment, separability
 from ivl.layout import layout_of
@@ -21,17 +19,6 @@ Trials = Callable[..., pd.DataFrame]
 Fly = Callable[[config.Sweep | config.PolicyMap, Path], Path]
 ROOT = Path(__file__).parents[2]
 GEARS = ("narrow_short", "wide_short", "wide_long")
-
-
-@pytest.fixture(scope="module")
-def tool() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("results_sweep", ROOT / "tools" / "results_sweep.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture
@@ -81,7 +68,7 @@ def write_data(campaign: pd.DataFrame, path: Path) -> None:
 
 @pytest.mark.usefixtures("quick")
 def test_check_finds_an_edited_number(
-    tool: ModuleType, campaign: pd.DataFrame, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    campaign: pd.DataFrame, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_data(campaign, tmp_path / "data")
     results = tmp_path / "RESULTS.md"
@@ -99,12 +86,12 @@ def test_check_finds_an_edited_number(
 
 
 @pytest.mark.parametrize("text", ["", "{begin}", "{end}{begin}", "{begin}{end}{begin}{end}"])
-def test_a_file_without_its_marks_is_refused(tool: ModuleType, text: str) -> None:
+def test_a_file_without_its_marks_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="once each"):
         marked.replace(text.format(begin=tool.BEGIN, end=tool.END), "new", tool.BEGIN, tool.END)
 
 
-def test_real_run_folders_are_collected(tool: ModuleType, fly: Fly, tmp_path: Path) -> None:
+def test_real_run_folders_are_collected(fly: Fly, tmp_path: Path) -> None:
     small = ["speeds_mps=[2.5, 4.0]", "angles_deg=[60.0, 90.0]", "gears=[wide_short]"]
     sweep = fly(config.load_sweep("sweeps/smoke.yaml", [*small, "budget=24"]), tmp_path / "sweep")
     axes = ["d_ceil_m=[0.3, 0.5, 0.8]", "moment_Nmm=[6.0, 8.0, 10.0]", "n_rollouts=2"]
@@ -129,9 +116,7 @@ def test_real_run_folders_are_collected(tool: ModuleType, fly: Fly, tmp_path: Pa
     assert sorted(run["vehicle"] for run in both.runs) == ["crazyflie21", "habas2021", "habas2021"]
 
 
-def test_the_committed_results_are_those_of_the_committed_data(
-    tool: ModuleType, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_committed_results_are_those_of_the_committed_data(capsys: pytest.CaptureFixture[str]) -> None:
     assert tool.main(["check"]) == 0, capsys.readouterr().out
 
 

@@ -18,6 +18,11 @@
 #include "unity.h"
 #include "usec_time.h"
 
+enum
+{
+    FIRST_ID = 100  // of the group ivl
+};
+
 sdk_t   sdk;
 uint8_t tumbleCheckEnabled;
 
@@ -247,9 +252,32 @@ float rangeGet(rangeDirection_t direction)
 
 paramVarId_t paramGetVarId(const char *group, const char *name)
 {
+    if (strcmp(group, "ivl") == 0)
+    {
+        return (paramVarId_t){.id = (uint16_t)(FIRST_ID + (find_param(name) - sdk_params_ivl))};
+    }
     TEST_ASSERT_EQUAL_STRING("motorPowerSet", group);
     TEST_ASSERT_EQUAL_STRING("enable", name);
     return (paramVarId_t){.id = 3u};
+}
+
+static void tell(paramVarId_t varid, uint8_t type, const void *bytes, size_t size)
+{
+    const struct param_s *p = &sdk_params_ivl[varid.id - FIRST_ID];
+    TEST_ASSERT_EQUAL_UINT8(type, p->type);
+    memcpy(p->address, bytes, size);
+    sdk.n_told++;
+}
+
+void paramSetFloat(paramVarId_t varid, float valuef)
+{
+    tell(varid, PARAM_FLOAT, &valuef, sizeof valuef);
+}
+
+void paramSetInt(paramVarId_t varid, int valuei)
+{
+    const uint8_t value = (uint8_t)valuei;
+    tell(varid, PARAM_UINT8, &value, sizeof value);
 }
 
 unsigned int paramGetUint(paramVarId_t varid)

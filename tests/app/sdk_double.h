@@ -49,6 +49,7 @@ typedef struct
     int                            n_pid_init, n_pid_null, n_pid;
     stabilizerStep_t               last_pid_step;
     int                            n_relax, n_go_to;
+    int                            n_told;  ///< parameters that were changed by the app, and told to clients
     float                          go_to[5];
     char                           printed[80];  ///< format of the last line
     sdk_packet_t                   sent[SDK_SENT_MAX];

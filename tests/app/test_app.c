@@ -254,6 +254,8 @@ static void test_value_out_of_range_or_no_number_is_refused_named_and_taken_back
         // nothing of it is in force, not even the good half
         TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 2.1f, ivl_app.cfg.h_ceil_m);
         TEST_ASSERT_TRUE(fabs(sdk_double_read_param("h_ceil") - 2.1) < 1.0e-6);
+        // clients are told of both
+        TEST_ASSERT_EQUAL_INT(2, sdk.n_told);
         TEST_ASSERT_FALSE(ivl_app.configured);
     }
 }
@@ -265,8 +267,10 @@ static void test_platform_refuses_a_rate_it_does_not_have_and_a_thrust_it_cannot
     TEST_ASSERT_EQUAL_STRING("tick_hz", ivl_cfg_name(commit(1).bad));
     sdk_double_write_float("motor_thrust_max", 0.19f);
     TEST_ASSERT_EQUAL_STRING("motor_thrust_max", ivl_cfg_name(commit(2).bad));
+    TEST_ASSERT_EQUAL_INT(2, sdk.n_told);
     sdk_double_write_float("tick_hz", 1000.0f);
     TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(3).status);
+    TEST_ASSERT_EQUAL_INT(2, sdk.n_told);
     const uint32_t n = ivl_app.state.diag.n_tick;
     sdk_double_run(100);
     TEST_ASSERT_EQUAL_UINT32(n + 100u, ivl_app.state.diag.n_tick);
@@ -654,14 +658,12 @@ static void test_reading_that_is_no_number_out_of_range_or_too_old_is_refused_an
             TEST_ASSERT_EQUAL_MEMORY(&before.rrev, &ivl_app.in.rrev, sizeof before.rrev);
             TEST_ASSERT_EQUAL_MEMORY(&before.flow, &ivl_app.in.flow, sizeof before.flow);
         }
-        // one that only becomes too old by what the operator says about the way
-        tell_reading((app_camera_t)camera, &(ivl_wire_reading_t){3u, 0.04f, 1.0f, 0.0f});
+        // the oldest, with the longest way that an operator can state
+        sdk_double_write_float("rrev_delay", 0.06f);
+        TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(2).status);
+        tell_reading((app_camera_t)camera, &(ivl_wire_reading_t){3u, 0.06f, 1.0f, 0.0f});
         sdk_double_run(2);
         assert_counts(2, n);
-        sdk_double_write_float("rrev_delay", 0.03f);
-        TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(2).status);
-        tell_reading((app_camera_t)camera, &(ivl_wire_reading_t){3u, 0.04f, 1.0f, 0.0f});
-        assert_counts(2, n + 1u);
     }
 }
 

@@ -162,17 +162,12 @@ static void read_all(void)
 {
     uint8_t                bytes[64];
     char                   text[64];
-    size_t                 n, index;
+    size_t                 n;
     const ivl_cf_memory_t *m = ivl_cf_memories(vehicle, &n);
     const uint32_t         size = dice(sizeof bytes), most = m[dice((uint32_t)n)].size();
     (void)m[dice((uint32_t)n)].read((dice(4) == 0) ? (uint32_t)draw_u64(&draws) : dice(most + 2u), size, bytes);
     while (ivl_cf_app_take(vehicle, bytes) > 0 || ivl_cf_console_take(vehicle, text, sizeof text) > 0)
     {
-    }
-    while (ivl_cf_param_take_changed(vehicle, &index))
-    {
-        (void)ivl_cf_params(vehicle, &n);
-        TEST_ASSERT_TRUE(index < n);
     }
     (void)ivl_cf_supervisor_info(vehicle);
     ivl_cf_logs_refresh(vehicle);

@@ -193,9 +193,10 @@ static void test_a_change_by_the_vehicle_is_told(void)
 {
     forget();
     fake_values.i16 = 258;
-    fake.changed = FAKE_P_I16;
-    ivl_crtp_step(&server);
-    ivl_crtp_step(&server);
+    for (int ms = 0; ms < 300; ms++)
+    {
+        ivl_crtp_step(&server);
+    }
     TEST_ASSERT_EQUAL_STRING("2f0101000201", sent);
 }
 
@@ -207,6 +208,20 @@ static void write_own(const char *name, float value)
     uint8_t        bytes[7] = {0x2e, (uint8_t)id, (uint8_t)(id >> 8)};
     memcpy(bytes + 3, &value, 4);
     ivl_crtp_receive(&server, bytes, sizeof bytes);
+}
+
+static void test_a_value_that_a_write_does_not_leave_is_told_at_once(void)
+{
+    // what was written is what it is: nobody is told
+    const unsigned before = n_sent;
+    write_own("loss", 0.5f);
+    ivl_crtp_step(&server);
+    TEST_ASSERT_EQUAL_UINT(1, n_sent - before);
+    write_own("loss", 7.0f);
+    ivl_crtp_step(&server);
+    TEST_ASSERT_EQUAL_UINT(3, n_sent - before);
+    ivl_crtp_step(&server);
+    TEST_ASSERT_EQUAL_UINT(3, n_sent - before);
 }
 
 static void test_fault_parameters_are_brought_into_range(void)
@@ -371,6 +386,7 @@ int main(void)
     RUN_TEST(test_default_is_the_value_at_the_start);
     RUN_TEST(test_persistent_value_is_stored_told_and_cleared);
     RUN_TEST(test_a_change_by_the_vehicle_is_told);
+    RUN_TEST(test_a_value_that_a_write_does_not_leave_is_told_at_once);
     RUN_TEST(test_fault_parameters_are_brought_into_range);
     RUN_TEST(test_lockstep_run_is_answered_when_it_is_there);
     RUN_TEST(test_lockstep_run_by_name_is_answered_when_it_is_there_too);

@@ -25,6 +25,7 @@ typedef struct
     uint64_t       t_last_us;
     bool           was_latched_off;
     ivl_phase_t    last_phase;
+    uint32_t       decided_crc;  // of the policy that was in force when it was decided last
     ivl_snapshot_t snapshot;
 } flight_t;
 
@@ -261,17 +262,26 @@ static void maybe_spoil(flight_t *f)
 // ---- what must hold
 
 /// The flip began where the policy says so, from what was latched alone, and after a go.
-static void check_region(const ivl_state_t *state)
+static void check_region(const flight_t *f)
 {
+    const ivl_state_t    *state = &f->fix.state;
     const ivl_snapshot_t *s = &state->snapshot;
     const ivl_seen_t      seen = {.ceiling = {.valid = true, .d_ceil_m = s->d_ceil_m},
                                   .cues = {.valid = true, .rrev_per_s = s->rrev_per_s, .of_y_radps = s->of_y_radps}};
     const ivl_action_t    action = ivl_form(state->policy.id.form)->decide(state->policy.theta, &seen);
-    TEST_ASSERT_EQUAL_UINT32(state->policy.id.crc, s->policy.crc);
+    TEST_ASSERT_EQUAL_HEX32(state->policy.id.crc, s->policy.crc);
+    TEST_ASSERT_EQUAL_HEX32(f->decided_crc, s->policy.crc);
     TEST_ASSERT_TRUE(action.flip);
     TEST_ASSERT_EQUAL_FLOAT(action.moment_Nm, s->action.moment_Nm);
     TEST_ASSERT_TRUE(state->decision.made && state->decision.go);
     n_general += (state->policy.id.form != 0u) ? 1u : 0u;
+}
+
+/// After each tick: whose decision it is that stands.
+static void note_decision(flight_t *f, bool was_decided)
+{
+    const ivl_state_t *state = &f->fix.state;
+    f->decided_crc = (state->decision.made && !was_decided) ? state->policy.id.crc : f->decided_crc;
 }
 
 static void check_trigger(flight_t *f, uint32_t n_trigger_before, bool is_pose_good)
@@ -290,7 +300,7 @@ static void check_trigger(flight_t *f, uint32_t n_trigger_before, bool is_pose_g
         TEST_ASSERT_EQUAL_UINT32(n_trigger_before + 1u, state->diag.n_trigger);
         TEST_ASSERT_TRUE(is_pose_good && approach_is_good(&f->fix.in.cmd, &f->fix.cfg));
         TEST_ASSERT_TRUE(vitals_are_good(&f->fix.in.vitals, &f->fix.cfg));
-        check_region(state);
+        check_region(f);
         TEST_ASSERT_TRUE((state->snapshot.rrev_per_s > 0.0f) && (state->snapshot.d_ceil_m > 0.0f));
         TEST_ASSERT_TRUE(state->snapshot.d_sigma_m >= 0.0f);
         TEST_ASSERT_TRUE(state->snapshot.d_sigma_m <= f->fix.cfg.d_sigma_norm_max * state->snapshot.d_ceil_m);
@@ -333,8 +343,10 @@ static void fuzz_tick(flight_t *f)
     const ivl_in_t clean = f->fix.in;
     maybe_spoil(f);
     const uint32_t n_trigger = f->fix.state.diag.n_trigger;
+    const bool     was_decided = (f->last_phase == IVL_PHASE_APPROACH) && f->fix.state.decision.made;
     const bool     is_pose_good = pose_is_good(&f->fix.in, &f->fix.cfg, f->t_last_us);
     ivl_step(&f->fix.cfg, &f->fix.state, &f->fix.in, &f->fix.out);
+    note_decision(f, was_decided);
     check_trigger(f, n_trigger, is_pose_good);
     check_motors(f, is_pose_good);
     n_ticks_in[f->fix.out.phase]++;

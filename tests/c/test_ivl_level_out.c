@@ -123,18 +123,175 @@ static void test_a_go_at_the_last_moment_is_not_taken_back(void)
     TEST_ASSERT_EQUAL_INT(IVL_ERR_PHASE, ivl_policy_commit(&fix.cfg, &fix.state, &other));
     // and this one is not asked again
     fix.state.policy.theta[10] = -3.0f;
-    climb(3.5f);
+    while ((fix.out.phase == IVL_PHASE_APPROACH) && (fix.in.p_WB_m.z < fix.cfg.h_ceil_m))
+    {
+        fix.in.p_WB_m.z += 3.5f / fix.cfg.tick_hz;
+        fix_tick(&fix);
+    }
     assert_phase(IVL_PHASE_FLIP, &fix);
 }
 
-static void test_no_go_without_a_valid_cue_is_not_decided(void)
+/// A source that estimates has no distance before its first measurement.
+static void test_nothing_is_decided_before_the_first_valid_cue(void)
 {
     approach(0.5f, -3.0f, 2.0f);
+    fix_request(&fix, IVL_REQUEST_IDLE);
+    fix.cfg.d_source = (uint8_t)IVL_SOURCE_RANGE;
+    fix_request(&fix, IVL_REQUEST_HOVER);
+    fix_request(&fix, IVL_REQUEST_APPROACH);
+    assert_phase(IVL_PHASE_APPROACH, &fix);
     fix.in.v_WB_mps = ivl_vec3(0.0f, 0.0f, 3.0f);
     fix.in.p_WB_m.z = fix.cfg.h_ceil_m - 0.005f;
     fix_tick(&fix);
     assert_phase(IVL_PHASE_APPROACH, &fix);
     TEST_ASSERT_FALSE(fix.state.decision.made);
+}
+
+// ---- without a cue
+
+/// The distance is no longer certain enough for a cue.
+static void lose_the_cue(void)
+{
+    fix.cfg.height_sigma_m = 1.0f;
+}
+
+/// An approach at rest whose reference has its speed.
+static void at_speed(float p_min, float log_odds, float threshold_per_s)
+{
+    approach(p_min, log_odds, threshold_per_s);
+    fix.in.p_WB_m.z = 0.1f;
+    fix_ticks(&fix, 1.0f);
+    assert_phase(IVL_PHASE_APPROACH, &fix);
+}
+
+static float distance_m(void)
+{
+    return fix.cfg.h_ceil_m - fix.in.p_WB_m.z;
+}
+
+static void rise_at(float v_mps)
+{
+    fix.in.v_WB_mps.z = v_mps;
+    fix.in.p_WB_m.z += v_mps / fix.cfg.tick_hz;
+    fix_tick(&fix);
+    assert_output_sane(&fix);
+}
+
+/// Whatever the policy thinks of it: what cannot see cannot flip.
+static void test_a_vehicle_that_loses_the_cue_levels_out_at_its_last_moment_all_the_same(void)
+{
+    for (float v = 0.3f; v < 4.5f; v += 0.3f)
+    {
+        for (float lost_m = 1.9f; lost_m > 0.5f; lost_m -= 0.2f)
+        {
+            at_speed(0.0f, 100.0f, 20.0f);
+            const float needed_m = room_needed_m(v);
+            while ((fix.out.phase == IVL_PHASE_APPROACH) && (distance_m() > 0.0f))
+            {
+                if (distance_m() < lost_m)
+                {
+                    lose_the_cue();
+                }
+                rise_at(v);
+            }
+            assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+            TEST_ASSERT_EQUAL_INT(IVL_RULE_NO_GO, fix.state.guard.cause);
+            // lost only past it: then at once
+            const float expected_m = (lost_m < needed_m) ? lost_m : needed_m;
+            TEST_ASSERT_FLOAT_WITHIN(2.5f * v / fix.cfg.tick_hz, expected_m, distance_m());
+            TEST_ASSERT_FALSE(fix.state.decision.go);
+        }
+    }
+}
+
+static void test_speed_that_grows_without_a_cue_is_reckoned_with(void)
+{
+    // straight up, as the reference: 4.3 m/s^2 up to 3.5 m/s
+    approach(0.0f, 100.0f, 20.0f);
+    fix_request(&fix, IVL_REQUEST_IDLE);
+    fix.in.cmd.speed_mps = 3.5f;
+    fix.in.cmd.angle_rad = IVL_HALF_PI;
+    fix.in.p_WB_m.z = 0.0f;
+    fix_request(&fix, IVL_REQUEST_HOVER);
+    fix_request(&fix, IVL_REQUEST_APPROACH);
+    float rise_m = 0.0f;
+    while ((fix.out.phase == IVL_PHASE_APPROACH) && (distance_m() > 0.0f))
+    {
+        if (distance_m() < 1.8f)
+        {
+            lose_the_cue();
+        }
+        rise_m = ivl_level_out_rise_m(&fix.cfg, fix.state.approach.speed_mps, fix.cfg.gravity_mps2 + 4.3f);
+        rise_at(fix.state.approach.speed_mps);
+    }
+    assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+    const float room_m = distance_m() - fix.cfg.d_touch_m - fix.cfg.level_margin_m;
+    TEST_ASSERT_TRUE((room_m > rise_m - 0.02f) && (room_m < rise_m + 0.03f));
+}
+
+static void test_a_go_is_worth_nothing_once_the_cue_is_lost(void)
+{
+    at_speed(0.5f, 3.0f, 12.0f);
+    fix.in.p_WB_m.z = fix.cfg.h_ceil_m - 0.7f;
+    rise_at(3.5f);
+    assert_phase(IVL_PHASE_APPROACH, &fix);
+    TEST_ASSERT_TRUE(fix.state.decision.made && fix.state.decision.go);
+    const float p_land = fix.state.decision.p_land, d_m = fix.state.decision.d_ceil_m;
+    lose_the_cue();
+    rise_at(3.5f);
+    assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+    TEST_ASSERT_FALSE(fix.state.decision.go);
+    // what the policy thought of it stays to be read
+    TEST_ASSERT_EQUAL_FLOAT(p_land, fix.state.decision.p_land);
+    TEST_ASSERT_EQUAL_FLOAT(d_m, fix.state.decision.d_ceil_m);
+}
+
+static void test_a_cue_that_comes_back_before_the_last_moment_is_taken(void)
+{
+    at_speed(0.0f, 100.0f, 3.0f);
+    const float sigma_m = fix.cfg.height_sigma_m;
+    lose_the_cue();
+    while (distance_m() > 1.0f)
+    {
+        rise_at(2.0f);
+    }
+    assert_phase(IVL_PHASE_APPROACH, &fix);
+    fix.cfg.height_sigma_m = sigma_m;
+    while ((fix.out.phase == IVL_PHASE_APPROACH) && (distance_m() > 0.0f))
+    {
+        rise_at(2.0f);
+    }
+    assert_phase(IVL_PHASE_FLIP, &fix);
+}
+
+// ---- a go that is asked again
+
+/// While the distance may be shorter than it seems, a go is not the last word: the vehicle gets faster, and sees better.
+static void test_a_go_is_asked_again_until_there_is_no_way_back(void)
+{
+    const float v = 2.0f;
+    for (int late = 0; late < 2; late++)
+    {
+        at_speed(0.5f, 3.0f, 20.0f);
+        fix.cfg.height_sigma_m = 0.08f;
+        fix.cfg.d_sigma_norm_max = 10.0f;
+        const float seems_m = room_needed_m(v) - 2.0f * fix.cfg.height_sigma_m;
+        fix.in.p_WB_m.z = fix.cfg.h_ceil_m - (seems_m + 0.15f);
+        rise_at(v);
+        TEST_ASSERT_TRUE(fix.state.decision.made && fix.state.decision.go);
+        const float d_first_m = fix.state.decision.d_ceil_m;
+        while ((late == 1) && (distance_m() > seems_m - 0.01f))
+        {
+            rise_at(v);
+        }
+        rise_at(v);
+        assert_phase(IVL_PHASE_APPROACH, &fix);
+        TEST_ASSERT_TRUE(fix.state.decision.d_ceil_m < d_first_m);
+        // from now on it thinks otherwise
+        fix.state.policy.theta[10] = -3.0f;
+        rise_at(v);
+        assert_phase((late == 0) ? IVL_PHASE_LEVEL_OUT : IVL_PHASE_APPROACH, &fix);
+    }
 }
 
 static void test_a_policy_that_always_goes_never_levels_out(void)
@@ -199,7 +356,7 @@ static void test_the_next_approach_decides_anew(void)
     climb(2.0f);
     assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
     fix.in.v_WB_mps = ivl_vec3(0.0f, 0.0f, 0.0f);
-    fix_tick(&fix);
+    fix_ticks(&fix, 2.0f);
     fix_request(&fix, IVL_REQUEST_HOVER);
     assert_phase(IVL_PHASE_READY, &fix);
     TEST_ASSERT_FALSE(fix.state.decision.made);
@@ -246,15 +403,79 @@ static void test_level_out_keeps_the_margin_and_hovers_where_the_approach_began(
     }
 }
 
-static void test_hover_is_obeyed_only_when_it_no_longer_rises(void)
+static void test_hover_is_obeyed_only_when_the_level_out_rests(void)
 {
     fix_to_phase(&fix, IVL_PHASE_LEVEL_OUT);
+    fix.in.v_WB_mps.x = 1.0f;
     fix_request(&fix, IVL_REQUEST_HOVER);
     assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
     fix.in.v_WB_mps.z = 0.0f;
-    fix_tick(&fix);
+    while (!ivl_level_out_rests(&fix.state))
+    {
+        fix_tick(&fix);
+        assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+    }
     fix_tick(&fix);
     assert_phase(IVL_PHASE_READY, &fix);
+}
+
+/// Between a level hover far below, and the fence: as far from both as there is room for.
+static void test_it_comes_to_rest_above_the_fence(void)
+{
+    const float fences_m[] = {-100.0f, 0.9f, 1.2f, 1.5f, 1.58f};
+    for (size_t i = 0; i < sizeof fences_m / sizeof fences_m[0]; i++)
+    {
+        fix_to_phase(&fix, IVL_PHASE_LEVEL_OUT);
+        fix.cfg.fence_z_m_min = fences_m[i];
+        const float top_m = fix.in.p_WB_m.z, begin_m = fix.state.level.z_W_m, middle_m = 0.5f * (top_m + fences_m[i]);
+        fix.in.v_WB_mps.z = 0.0f;
+        fix_tick(&fix);
+        assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+        const float z_m = fix.state.level.z_W_m;
+        TEST_ASSERT_TRUE(z_m >= fminf(fences_m[i] + 0.2499f, middle_m - 1.0e-5f));
+        TEST_ASSERT_TRUE(z_m <= fmaxf(top_m - 0.2499f, middle_m + 1.0e-5f));
+        // where it began, if that is far enough from both
+        TEST_ASSERT_TRUE((begin_m < fences_m[i] + 0.25f) || (fabsf(z_m - begin_m) < 1.0e-6f));
+    }
+}
+
+/// Neither an abort that is asked for nor one by a rule steers a vehicle that rises: it levels out, and then lands.
+static void test_an_abort_on_the_way_up_levels_out_before_it_lands(void)
+{
+    const ivl_phase_t from[] = {IVL_PHASE_APPROACH, IVL_PHASE_LEVEL_OUT};
+    for (int i = 0; i < 4; i++)
+    {
+        fix_to_phase(&fix, from[i % 2]);
+        fix.in.v_WB_mps = ivl_vec3(2.0f, 0.5f, 1.5f);
+        fix.cfg.fence_x_m_max = (i < 2) ? 100.0f : -1.0f;
+        fix_request(&fix, (i < 2) ? IVL_REQUEST_ABORT : IVL_REQUEST_APPROACH);
+        for (int k = 0; k < 20; k++)
+        {
+            rise_at(1.5f);
+            assert_phase(IVL_PHASE_ABORTED, &fix);
+            // upright with the least lift, and no moment
+            TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 0.2f * 9.81f * fix.cfg.mass_kg, fix.out.thrust_total_N);
+            TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, fix.out.thrust_N[0], fix.out.thrust_N[2]);
+        }
+        fix.in.v_WB_mps = ivl_vec3(0.0f, 0.0f, 0.0f);
+        fix_tick(&fix);
+        TEST_ASSERT_FALSE(fix.state.level.rises);
+        fix_ticks(&fix, 6.0f);
+        assert_phase(IVL_PHASE_ABORTED, &fix);
+        TEST_ASSERT_TRUE(ivl_level_out_rests(&fix.state));
+        TEST_ASSERT_TRUE(fix.state.p_hold_W_m.z < fix.state.level.z_W_m);
+    }
+}
+
+static void test_an_abort_in_ready_hovers_where_it_is(void)
+{
+    fix_to_phase(&fix, IVL_PHASE_READY);
+    fix.in.p_WB_m = ivl_vec3(0.3f, -0.2f, 1.1f);
+    fix.in.v_WB_mps.z = 0.2f;
+    fix_request(&fix, IVL_REQUEST_ABORT);
+    TEST_ASSERT_EQUAL_MEMORY(&fix.in.p_WB_m, &fix.state.p_hold_W_m, sizeof fix.in.p_WB_m);
+    fix_tick(&fix);
+    TEST_ASSERT_EQUAL_MEMORY(&fix.in.p_WB_m, &fix.state.p_hold_W_m, sizeof fix.in.p_WB_m);
 }
 
 static void test_a_forgotten_level_out_lands(void)
@@ -295,14 +516,22 @@ int main(void)
     RUN_TEST(test_no_go_is_decided_at_the_last_moment);
     RUN_TEST(test_no_go_is_decided_at_the_trigger_if_that_comes_first);
     RUN_TEST(test_a_go_at_the_last_moment_is_not_taken_back);
-    RUN_TEST(test_no_go_without_a_valid_cue_is_not_decided);
+    RUN_TEST(test_nothing_is_decided_before_the_first_valid_cue);
+    RUN_TEST(test_a_vehicle_that_loses_the_cue_levels_out_at_its_last_moment_all_the_same);
+    RUN_TEST(test_speed_that_grows_without_a_cue_is_reckoned_with);
+    RUN_TEST(test_a_go_is_worth_nothing_once_the_cue_is_lost);
+    RUN_TEST(test_a_cue_that_comes_back_before_the_last_moment_is_taken);
+    RUN_TEST(test_a_go_is_asked_again_until_there_is_no_way_back);
     RUN_TEST(test_a_policy_that_always_goes_never_levels_out);
     RUN_TEST(test_a_bad_command_does_not_hold_up_a_no_go);
     RUN_TEST(test_a_level_out_comes_back_to_where_the_approach_began);
     RUN_TEST(test_nothing_is_decided_before_the_ceiling_comes_closer);
     RUN_TEST(test_the_next_approach_decides_anew);
     RUN_TEST(test_level_out_keeps_the_margin_and_hovers_where_the_approach_began);
-    RUN_TEST(test_hover_is_obeyed_only_when_it_no_longer_rises);
+    RUN_TEST(test_hover_is_obeyed_only_when_the_level_out_rests);
+    RUN_TEST(test_it_comes_to_rest_above_the_fence);
+    RUN_TEST(test_an_abort_on_the_way_up_levels_out_before_it_lands);
+    RUN_TEST(test_an_abort_in_ready_hovers_where_it_is);
     RUN_TEST(test_a_forgotten_level_out_lands);
     RUN_TEST(test_brakes_along_the_ceiling_without_a_jump);
     return UNITY_END();

@@ -131,6 +131,10 @@ static void test_hover_request_calls_an_approach_back(void)
 {
     fix_to_phase(&fix, IVL_PHASE_APPROACH);
     fix_request(&fix, IVL_REQUEST_HOVER);
+    // which is no no-go, but goes the same way
+    assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+    TEST_ASSERT_EQUAL_UINT32(0u, fix.state.diag.n_no_go);
+    fix_ticks(&fix, 1.0f);
     assert_phase(IVL_PHASE_READY, &fix);
     fix_request(&fix, IVL_REQUEST_APPROACH);
     assert_phase(IVL_PHASE_APPROACH, &fix);
@@ -275,10 +279,10 @@ static void test_only_idle_then_hover_starts_the_next_cycle(void)
     assert_phase(IVL_PHASE_IDLE, &fix);
     fix_request(&fix, IVL_REQUEST_APPROACH);
     assert_phase(IVL_PHASE_IDLE, &fix);
-    TEST_ASSERT_TRUE(fix.state.snapshot.t_us > 0u);  // still there to be read
+    TEST_ASSERT_TRUE(fix.state.snapshot.sample.t_us > 0u);  // still there to be read
     fix_request(&fix, IVL_REQUEST_HOVER);
     assert_phase(IVL_PHASE_READY, &fix);
-    TEST_ASSERT_EQUAL_UINT64(0, fix.state.snapshot.t_us);
+    TEST_ASSERT_EQUAL_UINT64(0, fix.state.snapshot.sample.t_us);
     // and the whole cycle works again
     fix.in.p_WB_m.z = 1.0f;
     fix_request(&fix, IVL_REQUEST_APPROACH);

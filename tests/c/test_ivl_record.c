@@ -108,6 +108,66 @@ static void test_flip_is_recorded_with_what_was_before_it(void)
     }
 }
 
+/// Minutes of hover after a no-go must not push the decision out of the ring.
+static void test_a_no_go_is_recorded_with_its_decision_and_its_highest_point(void)
+{
+    ivl_record_init(&recorder);
+    start_approach(1000);
+    const ivl_policy_t policy = no_go_policy(8);
+    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix.cfg, &fix.state, &policy));
+    fix.in.p_WB_m.z = 1.6f;
+    fix.in.v_WB_mps.z = 2.5f;
+    tick();
+    assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+    const uint32_t t_decided_us = (uint32_t)fix.in.t_us;
+    for (int i = 0; i < 150; i++)
+    {
+        fix.in.p_WB_m.z += fix.in.v_WB_mps.z / fix.cfg.tick_hz;
+        fix.in.v_WB_mps.z -= 2.5f / 150.0f;
+        tick();
+    }
+    fix.in.v_WB_mps.z = 0.0f;
+    ticks(3000);
+    read_all();
+    const uint32_t row = number_at(8, 2);
+    TEST_ASSERT_EQUAL_UINT32(IVL_RECORD_ROWS - IVL_RECORD_ROWS_POST - 1u, row);
+    TEST_ASSERT_EQUAL_UINT32(8, number_at(16, 4));
+    TEST_ASSERT_EQUAL_HEX32(policy.id.crc, number_at(20, 4));
+    TEST_ASSERT_EQUAL_UINT32(policy.id.form, number_at(11, 1));
+    TEST_ASSERT_EQUAL_UINT32(t_decided_us, number_at(32, 4));
+    TEST_ASSERT_EQUAL_UINT32(t_decided_us, row_at(row, 0, 4));
+    TEST_ASSERT_EQUAL_UINT32(IVL_RULE_NO_GO, row_at(row, 43, 1));
+    TEST_ASSERT_EQUAL_UINT32(IVL_PHASE_APPROACH, row_at(row - 1u, 42, 1));
+    TEST_ASSERT_INT_WITHIN(1, (int)(1000.0f * fix.in.p_WB_m.z), (int)row_at(row + 150u, 8, 2));
+}
+
+static void test_the_next_approach_of_the_same_cycle_is_a_recording_of_its_own(void)
+{
+    ivl_record_init(&recorder);
+    start_approach(10);
+    const ivl_policy_t no_go = no_go_policy(8), go = constant_policy(9, 4.0f, 0.008f);
+    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix.cfg, &fix.state, &no_go));
+    fix.in.p_WB_m.z = 1.6f;
+    fix.in.v_WB_mps.z = 2.5f;
+    tick();
+    fix.in.v_WB_mps.z = 0.0f;
+    ticks(1000);
+    fix.in.p_WB_m.z = 1.0f;
+    request(IVL_REQUEST_HOVER);
+    assert_phase(IVL_PHASE_READY, &fix);
+    // still the first one
+    read_all();
+    TEST_ASSERT_EQUAL_UINT32(1, number_at(12, 4));
+    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix.cfg, &fix.state, &go));
+    request(IVL_REQUEST_APPROACH);
+    trigger();
+    ticks(1000);
+    read_all();
+    TEST_ASSERT_EQUAL_UINT32(2, number_at(12, 4));
+    TEST_ASSERT_EQUAL_UINT32(9, number_at(16, 4));
+    TEST_ASSERT_EQUAL_UINT32(IVL_PHASE_FLIP, row_at(number_at(8, 2), 42, 1));
+}
+
 static void test_row_holds_the_values_in_their_units(void)
 {
     ivl_record_init(&recorder);
@@ -214,6 +274,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_header_can_be_read_before_anything_is_recorded);
     RUN_TEST(test_flip_is_recorded_with_what_was_before_it);
+    RUN_TEST(test_a_no_go_is_recorded_with_its_decision_and_its_highest_point);
+    RUN_TEST(test_the_next_approach_of_the_same_cycle_is_a_recording_of_its_own);
     RUN_TEST(test_row_holds_the_values_in_their_units);
     RUN_TEST(test_values_beyond_the_type_are_limited);
     RUN_TEST(test_cycle_without_trigger_freezes_when_it_ends);

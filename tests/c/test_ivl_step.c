@@ -208,10 +208,10 @@ static void test_landing_goes_through_its_phases_once(void)
     assert_phase(IVL_PHASE_FLIP, &fix);
     const ivl_snapshot_t snapshot = fix.state.snapshot;
     TEST_ASSERT_TRUE((rrev_before < 4.0f) && (snapshot.rrev_per_s >= 4.0f));
-    TEST_ASSERT_EQUAL_UINT64(fix.in.t_us, snapshot.t_us);
-    TEST_ASSERT_EQUAL_MEMORY(&fix.in.p_WB_m, &snapshot.p_WB_m, sizeof snapshot.p_WB_m);
-    TEST_ASSERT_EQUAL_MEMORY(&fix.in.v_WB_mps, &snapshot.v_WB_mps, sizeof snapshot.v_WB_mps);
-    TEST_ASSERT_EQUAL_FLOAT(2.7f - snapshot.p_WB_m.z, snapshot.d_ceil_m);
+    TEST_ASSERT_EQUAL_UINT64(fix.in.t_us, snapshot.sample.t_us);
+    TEST_ASSERT_EQUAL_MEMORY(&fix.in.p_WB_m, &snapshot.sample.p_WB_m, sizeof snapshot.sample.p_WB_m);
+    TEST_ASSERT_EQUAL_MEMORY(&fix.in.v_WB_mps, &snapshot.sample.v_WB_mps, sizeof snapshot.sample.v_WB_mps);
+    TEST_ASSERT_EQUAL_FLOAT(2.7f - snapshot.sample.p_WB_m.z, snapshot.d_ceil_m);
     TEST_ASSERT_EQUAL_UINT32(7, snapshot.policy.seq);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, -0.008f, fix.out.pitch_moment_Nm);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, fix.out.thrust_N[1] + fix.out.thrust_N[2]);

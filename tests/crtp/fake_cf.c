@@ -35,7 +35,6 @@ void fake_clear(void)
 void fake_reset(void)
 {
     memset(&fake, 0, sizeof fake);
-    fake.changed = -1;
     fake_values = (fake_values_t){
         .u8 = 2,
         .i16 = -3,
@@ -108,6 +107,11 @@ void ivl_cf_set_address(ivl_cf_t *cf, uint8_t address)
     (void)say("address %02x", address);
 }
 
+void ivl_cf_skip(ivl_cf_t *cf, uint64_t us)
+{
+    (void)cf, (void)us;
+}
+
 bool ivl_cf_is_deck(const char *name)
 {
     return strcmp(name, "bcFlow2") == 0;
@@ -162,15 +166,6 @@ void ivl_cf_logs_refresh(ivl_cf_t *cf)
 {
     (void)cf;
     fake.n_refreshed++;
-}
-
-bool ivl_cf_param_take_changed(ivl_cf_t *cf, size_t *index)
-{
-    (void)cf;
-    const bool any = fake.changed >= 0;
-    *index = any ? (size_t)fake.changed : 0u;
-    fake.changed = -1;
-    return any;
 }
 
 // ---- memories: one that can be written, one that cannot

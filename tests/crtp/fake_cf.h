@@ -18,7 +18,6 @@ typedef struct
     size_t      app_size;  ///< packet to be sent
     bool        flies_high_level;
     uint8_t     group_mask;
-    int         changed;  ///< index of a parameter that the vehicle has changed, -1: none
     uint8_t     memory[40];
 } fake_cf_t;
 

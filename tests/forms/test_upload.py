@@ -1,4 +1,4 @@
-"""A policy of 64 parameters travels in 16 packets, over a bad link too; forms that differ are told in one line."""
+"""A policy of 64 parameters travels in 16 packets, over a bad link too; forms that differ are refused in one line."""
 
 import os
 import subprocess

@@ -1,16 +1,19 @@
 """An approach that the policy calls off, flown over a link: scored, never discarded, and the vehicle comes home."""
 
 import json
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import cast
 
 import numpy as np
+import policies
 import pytest
 
 from ivl import cli, experiment
 from ivl.experiment import Experiment
 from ivl.links.crazyflie import CrazyflieSource
-from ivl.links.landing_flight import Rollout, make_safe
+from ivl.links.landing_flight import Rollout, end_level_out, make_safe
 from ivl.links.operators import Seen
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Request
@@ -18,10 +21,10 @@ from ivl.links.truth import Resting
 from ivl.links.vehicle import Command, Vehicle
 from ivl.policy import file, use
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import PolicyTask
 from ivl.policy.shape import General
 from ivl.silproc import SilProcess
 from ivl.source import Plan
+from ivl.surface import Surface
 
 SLOW, FAST = (0.6, 60.0), (2.5, 60.0)
 """Approaches that the policy refuses and flies."""
@@ -49,26 +52,15 @@ class Script:
 @pytest.fixture(scope="module")
 def policy() -> PolicyFile:
     """It lands in the box, and refuses slow approaches."""
-    shape = General("polynomial2")
-    theta = shape.level(5.082, 10.0)
-    theta[shape.threshold] = [5.082, 0.253, 1.408, -0.208, 0.379, -0.922]
-    theta[shape.go_p_min] = 0.5
-    theta[shape.go] = [5.0, 4.0, 8.0] + [0.0] * 7
-    task = PolicyTask(
-        vehicle="habas2021",
-        gear="wide_short",
-        gear_set="as_simulated",
-        estimator="known_height_predicted",
-        start="flown",
-    )
-    return file.make(shape.form, theta.tolist(), [task], None, None)
+    return policies.by_hand()
 
 
-def flies(policy: PolicyFile, approach: tuple[float, float]) -> Experiment:
+def flies(policy: PolicyFile, approach: tuple[float, float], *settings: str) -> Experiment:
     """An experiment that flies the policy at this approach."""
     change = use.on_its_task(policy)
     speed_mps, angle_deg = approach
-    return experiment.load("experiments/paper_vertical.yaml", [], change, speed_mps=speed_mps, angle_deg=angle_deg)
+    path = "experiments/paper_vertical.yaml"
+    return experiment.load(path, settings, change, speed_mps=speed_mps, angle_deg=angle_deg)
 
 
 @pytest.fixture
@@ -156,6 +148,61 @@ def test_a_rehearsal_ends_a_no_go_on_the_floor_with_the_outcome_of_the_simulator
         assert outcome["d_decided_m"][0] == pytest.approx(known["d_decided_m"][0], abs=0.01)
         assert outcome["d_min_m"][0] == pytest.approx(known["d_min_m"][0], abs=0.03)
         assert np.isnan(outcome["t_impact_s"][0])
+
+
+@pytest.mark.parametrize("level_out_s_max", [0.1, 0.3])  # long before it could hover
+def test_a_level_out_that_ends_in_a_scored_abort_is_still_a_no_go(
+    policy: PolicyFile, tmp_path: Path, level_out_s_max: float
+) -> None:
+    chosen, script = flies(policy, SLOW, f"firmware.level_out_s_max={level_out_s_max}"), Script()
+    said: list[str] = []
+    options = Options(tmp_path, script, rehearse=True, say=said.append)
+    with SilProcess(chosen.make_world()) as process, CrazyflieSource(process.uri, chosen, options) as source:
+        (flown,) = source.fly(plan_of(chosen, 1))
+        end_reason = source.world.end_reason(int(flown.outcomes["end_reason"][0]))
+        assert source.n_discarded == 0
+    assert script.asked == ["place", "confirm 0 called off by the policy, aborted: level_out_time"]
+    outcome, known = flown.outcomes, here(flies(policy, SLOW), 0, 0)
+    assert [outcome[name][0] for name in ("no_go", "decided", "n_legs", "triggered")] == [1, 1, 0, 0]
+    assert outcome["p_land"][0] == pytest.approx(known["p_land"][0], abs=0.02)
+    assert end_reason == "missed", "it did not come to rest"
+    (told,) = (line for line in said if line.startswith("flown: "))
+    assert told.startswith("flown: no_go at P ")
+
+
+@pytest.mark.parametrize("phase", [Phase.LEVEL_OUT, Phase.ABORTED])
+def test_the_distance_of_a_level_out_is_that_from_the_surface_however_it_is_tilted(phase: Phase) -> None:
+    half = math.sqrt(0.5)
+    wall = Surface((2.0, 0.0, 3.0), (half, 0.0, half), (0.0, 0.0, 0.0))
+    way = [(0.0, 0.0, 1.0), (1.0, 0.0, 2.0), (0.5, 0.0, 1.5), (0.5, 0.0, 1.5), (0.5, 0.0, 1.5)]
+
+    class Flier:
+        """Follows its way, and is in a phase at the end of it."""
+
+        aborted_by, n, asked = "", 0, 0
+        position_W_m = way[0]
+        phase = Phase.LEVEL_OUT
+
+        def wait(self, condition: Callable[[], bool], *_: object) -> None:
+            while not condition():
+                self.n += 1
+                self.position_W_m = way[self.n]
+                self.phase = phase if self.n >= 2 else Phase.LEVEL_OUT
+
+        def decision(self) -> tuple[float, float]:
+            return (0.25, 0.8) if not self.asked else (math.nan, math.nan)
+
+        def ask_for(self, *_: object) -> None:
+            self.asked += 1
+
+        def come_down(self) -> None:
+            assert self.asked == 1
+
+    flier = Flier()
+    told = end_level_out(cast("Vehicle", flier), wall)
+    assert told.nearest_m == pytest.approx(2.0 * half)
+    assert told.decision == (0.25, 0.8)
+    assert flier.asked == (phase == Phase.LEVEL_OUT)
 
 
 def test_a_rehearsed_landing_tells_its_decision_too(policy: PolicyFile, server: SilProcess) -> None:

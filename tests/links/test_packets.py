@@ -141,6 +141,19 @@ def test_recorder_rows_come_in_si_units_and_survive_the_wrap_of_the_clock() -> N
     assert all(line.count(",") == lines[0].count(",") for line in lines)
 
 
+def test_a_recording_that_begins_with_a_level_out_has_no_trigger() -> None:
+    header_dtype = native.library().layout(native.LAYOUT_RECORD_HEADER)[1]
+    row_dtype = native.library().layout(native.LAYOUT_RECORD_ROW)[1]
+    header = np.zeros(1, dtype=header_dtype)
+    header["magic"], header["version"], header["row_size"] = packets.RECORD_MAGIC, 2, row_dtype.itemsize
+    header["n_rows"], header["trigger_row"], header["thrust_N_max"], header["tick_hz"] = 3, 1, 0.2, 500
+    rows = np.zeros(3, dtype=row_dtype)
+    for phase, expected in ((Phase.LEVEL_OUT, None), (Phase.FLIP, 1)):
+        rows["phase"] = (Phase.APPROACH, phase, phase)
+        recording = packets.record_rows(packets.record_header(header.tobytes()), rows.tobytes())
+        assert recording.trigger_row == expected
+
+
 def test_configuration_and_its_crc_are_those_of_the_world(vertical: object) -> None:
     world = vertical.make_world()  # type: ignore[attr-defined]
     record, crc = world.native_model.config()

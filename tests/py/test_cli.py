@@ -89,7 +89,7 @@ def test_rollout_from_hover_and_at_the_trigger(capsys: Capture) -> None:
         (["--gear", "wide_shrt"], "did you mean 'wide_short'"),
         (["--gear-set", "table2"], "no gear set 'table2', did you mean 'table1'"),
         (["--vehicle", "none"], "no vehicle 'none'"),
-        (["--set", "sense.latency=1e-3"], "write numbers as 1.0e-6"),
+        (["--set", "sense.latency='1e-3'"], "write the number without them"),
         (["--set", "sense.latncy=0.001"], "did you mean 'sense.latency'"),
         (["--set", "sense.latency"], "expected name=value"),
         (["--trace", "x.txt"], "unknown kind of file (allowed .csv, .npz)"),

@@ -66,7 +66,7 @@ def test_the_resolved_text_reads_back_as_the_same_experiment(small: Experiment, 
     [
         ("speed_mps", -1.0, "small.yaml: speed_mps: value -1.0"),
         ("speed_mps", "2.5", "small.yaml: speed_mps: value '2.5'"),
-        ("speed_mps", "1e-6", "write numbers as 1.0e-6"),
+        ("speed_mps", "1e-6", "write the number without them"),
         ("speed_mps", True, "small.yaml: speed_mps: value True"),
         ("speed_mps", float("nan"), "small.yaml: speed_mps: value nan"),
         ("vehicle", ..., "small.yaml: vehicle: is missing"),
@@ -126,7 +126,8 @@ def test_a_reward_s_options_stay_as_long_as_its_name_does(small_file: Path) -> N
     [
         ("speed_mps", "expected name=value"),
         ("=3", "expected name=value"),
-        ("speed_mps=1e-6", "write numbers as 1.0e-6"),
+        ("speed_mps='1e-6'", "write the number without them"),
+        ("angle_deg=060", "value '060' is ambiguous"),
         ("sense.latency=1", "override: sense.latency: value 1.0 is out of range (allowed 0 .. 0.1 s)"),
         ("sense.latncy=0.01", "sense.latncy: unknown parameter, did you mean 'sense.latency'?"),
         ("speed_mps.x=1", "speed_mps is a value"),

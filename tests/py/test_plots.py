@@ -1,3 +1,6 @@
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -71,7 +74,36 @@ def test_the_drawn_legs_have_the_length_of_the_legs(world: ivl.World) -> None:
 @pytest.mark.parametrize("name", ["missing/x.png", "x.unknown"])
 def test_a_figure_that_cannot_be_written_is_named(tmp_path: Path, name: str) -> None:
     with pytest.raises(ConfigError, match="the figure cannot be written"):
-        style.save(style.new_figure(1, 1), [tmp_path / name])
+        style.drawing(lambda: style.save(style.new_figure(1, 1), [tmp_path / name]))()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_has_the_same_bytes_whatever_the_settings_around_it(tmp_path: Path) -> None:
+    code = (
+        "import sys, pathlib\n"
+        "from ivl.plots import style\n"
+        "import matplotlib as mpl\n"
+        "mpl.rcParams.update({'font.size': 30, 'axes.grid': True} if sys.argv[2] == 'odd' else {})\n"
+        "before = dict(mpl.rcParams)\n"
+        "@style.drawing\n"
+        "def draw(folder):\n"
+        "    figure = style.new_figure(2, 2)\n"
+        "    figure.subplots().plot([1, 3, 2], label='x')\n"
+        "    return style.save(figure, [folder / f'p{s}' for s in ('.png', '.svg', '.pdf')])\n"
+        "draw(pathlib.Path(sys.argv[1]))\n"
+        "assert dict(mpl.rcParams) == before\n"
+    )
+    (tmp_path / "matplotlibrc").write_text("lines.linewidth: 9\nsavefig.bbox: tight\ntext.usetex: True\n")
+    cases = {
+        "plain": {},
+        "odd": {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "MATPLOTLIBRC": str(tmp_path)},
+    }
+    for name, environment in cases.items():
+        (tmp_path / name).mkdir()
+        command = [sys.executable, "-c", code, str(tmp_path / name), name]
+        subprocess.run(command, check=True, env={**os.environ, **environment})
+    for suffix in (".png", ".svg", ".pdf"):
+        assert (tmp_path / "plain" / f"p{suffix}").read_bytes() == (tmp_path / "odd" / f"p{suffix}").read_bytes()
 
 
 def drawn(world: ivl.World, trace: Trace, monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[np.ndarray], list[str]]]:

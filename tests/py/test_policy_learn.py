@@ -1,5 +1,6 @@
 """Learning a policy for every approach, its file, its use and its judgement."""
 
+import copy
 import json
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,14 @@ import pytest
 import yaml
 from policies import TASK
 
-from ivl import cli, experiment, forms
+from ivl import cli, experiment, forms, native
+from ivl.analysis.intervals import share_of_clusters, wilson
 from ivl.errors import ConfigError
 from ivl.outcome import clean, four_leg
 from ivl.policy import assess as judging
 from ivl.policy import file, general, use
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Drawn, Place, fly
+from ivl.policy.flying import Drawn, Place, PolicyTask, fly
 from ivl.policy.learn import Progress, learn
 from ivl.policy.region import PLANE, Region, Series
 from ivl.policy.shape import GO, General
@@ -87,8 +89,8 @@ def test_it_says_how_it_was_learned(learned: PolicyFile) -> None:
     assert score is not None
     assert training.learner.name == "cmaes"
     assert training.approaches == 3 * 8
-    # map, search, choice among the start and three ends, go / no-go twice
-    assert training.rollouts == 30 * 4 + 3 * 4 * 8 + 4 * 60 + 2 * 300
+    # map, three starts, search, choice among the start and three ends, go / no-go twice, and its effect
+    assert training.rollouts == 30 * 4 + 3 * 8 + 3 * 4 * 8 + 4 * 60 + 2 * 300 + 60
     assert training.objective == pytest.approx(0.5 * (score.landed + score.clean))
     assert training.start_objective is not None
     assert training.objective >= training.start_objective
@@ -139,10 +141,34 @@ def test_a_family_takes_the_place_of_each_task_s_vehicle() -> None:
     assert found.training.family == Drawn(n_vehicles=3, seed=1)
     assert found.score.flights == 3 * 60
     members = Place.of(found.tasks[0]).members(Drawn(n_vehicles=3, seed=1), Purpose.FAMILY)
-    approaches = Series([Region.model_validate(regions[0])], 0, Purpose.SELECT).next(60)
+    # each vehicle has approaches of its own, which are many together
+    approaches = Series([Region.model_validate(regions[0])], 0, Purpose.SELECT).for_each(3, 60)
+    assert len(set(np.concatenate([batch.stream for batch in approaches]))) == 3 * 60
+    assert found.training.approaches == 3 * 3 * 8
     flown = fly(members, "polynomial2", General("polynomial2").always_go(found.values), approaches)
     assert found.score.landed == pytest.approx(np.mean([four_leg(o).mean() for o in flown]))
     assert found.sealed() == found
+
+
+def test_vehicles_do_not_share_their_approaches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few approaches of each of many vehicles would else be few approaches."""
+    task = {**tiny()["tasks"][0], "vehicle": "crazyflie21", "gear": "wide_long", "gear_set": "table1"}
+    met: dict[tuple[int, int], int] = {}
+    flown: list[int] = []
+
+    def spy(places: list[Place], form: str, theta: Any, approaches: Any, threads: Any = None) -> Any:
+        flown.append(len(places))
+        for place, batch in zip(places, approaches, strict=True):
+            for stream in batch.stream:
+                assert met.setdefault((batch.seed, int(stream)), id(place)) == id(place)
+        return fly(places, form, theta, approaches, threads)
+
+    for module in ("search", "learn", "go"):
+        monkeypatch.setattr(f"ivl.policy.{module}.fly", spy)
+    regions = [{"speeds_mps": [3.0, 3.5], "angles_deg": [75.0, 90.0]}]
+    learn(tiny_experiment(tasks=[task], drawn={"n_vehicles": 3}, regions=regions))
+    assert set(flown) == {3}
+    assert len(met) > 3 * (3 * 8 + 60 + 200 + 100)
 
 
 def test_a_family_of_a_vehicle_without_sigmas_is_said() -> None:
@@ -223,15 +249,59 @@ def test_a_file_reads_back_as_it_was(learned: PolicyFile, by_hand: PolicyFile, t
         again = file.load(tmp_path / "p.yaml")
         assert again == policy
         assert again.values == policy.values
-        assert again.crc == policy.crc
+        assert again.checksum == policy.checksum
         assert [entry.name for entry in tmp_path.iterdir()] == ["p.yaml"]
 
 
 def test_a_file_of_numbers_alone_is_enough(by_hand: PolicyFile, tmp_path: Path) -> None:
     data = by_hand.model_dump(mode="json")
     short = {name: data[name] for name in ("ivl_policy", "form", "theta", "tasks")}
-    (tmp_path / "p.yaml").write_text(yaml.safe_dump(short))
+    (tmp_path / "p.yaml").write_text(yaml.safe_dump({**short, "digest": "none"}))
     assert file.load(tmp_path / "p.yaml").values == by_hand.values
+    (tmp_path / "p.yaml").write_text(yaml.safe_dump(short))
+    with pytest.raises(ConfigError, match=r"^p\.yaml: digest: is missing \(digest: none accepts a policy that was"):
+        file.load(tmp_path / "p.yaml")
+
+
+@pytest.mark.parametrize("name", ["digest", "form_table", "crc", "made_by"])
+def test_a_file_says_what_it_was_made_for_and_what_has_changed(name: str, path: Path) -> None:
+    """Each mark is looked at by itself: the digest of a file whose marks are wrong may be right."""
+    data = yaml.safe_load(path.read_text())
+    assert data["made_by"] == native.library().digest()
+    assert data["crc"] == f"{file.load(path).checksum:08x}"
+    data[name] = data[name][:-1] + ("0" if data[name][-1] != "0" else "1")
+    if name != "digest":
+        data["digest"] = file._digest(data)
+    path.write_text(yaml.safe_dump(data))
+    if name == "made_by":  # of another version of the simulator: told, not refused
+        assert file.load(path).made_by == data["made_by"]
+        return
+    with pytest.raises(ConfigError, match=rf"^g\.yaml: {name}: value '.*\(digest: none accepts") as error:
+        file.load(path)
+    assert "\n" not in str(error.value)
+
+
+def test_a_changed_number_is_flown_if_the_file_says_so(path: Path, capsys: Capture) -> None:
+    data = yaml.safe_load(path.read_text())
+    data["theta"]["r_0_per_s"]["value"] = 5.5
+    data["digest"] = "none"
+    path.write_text(yaml.safe_dump(data))
+    assert file.load(path).values[0] == 5.5
+    assert "none: written or changed by hand" in run(["policy", "show", str(path)], capsys)
+
+
+def test_a_digest_is_that_of_the_file_whatever_the_defaults_are(path: Path) -> None:
+    """The default of another version must not take the place of what a file said, nor of what it did not say."""
+    data = yaml.safe_load(path.read_text())
+    for name, default in (("approach", PolicyTask.model_fields["approach"].default), ("start", "flown")):
+        without = copy.deepcopy(data)
+        assert without["tasks"][0].pop(name) == default
+        path.write_text(yaml.safe_dump(without))
+        with pytest.raises(ConfigError, match=r"digest: .*changed after it was written"):
+            file.load(path)
+        # as an earlier version would have written it, that knew no such field
+        path.write_text(yaml.safe_dump({**without, "digest": file._digest(without)}))
+        assert file.load(path).tasks[0].gear == "wide_short"
 
 
 @pytest.mark.parametrize(
@@ -303,7 +373,7 @@ def test_an_assessment_is_what_a_direct_count_says(by_hand: PolicyFile) -> None:
     assert found.go.strikes_avoided.value == (refused & strike).sum() / strike.sum()
     assert found.go.refused_good.value == (refused & landed).sum() / 300
     assert found.go.no_go.value == refused.mean()
-    assert found.go.level_out_contacts == (refused & np.isfinite(own.t_impact_s)).sum()
+    assert found.go.level_out_contacts + found.go.contacts_before == (refused & np.isfinite(own.t_impact_s)).sum()
     told = free.p_land > 0
     pairs = free.p_land[told & landed][:, None] - free.p_land[told & ~landed][None, :]
     assert found.go.auc == pytest.approx(((pairs > 0) + 0.5 * (pairs == 0)).mean())
@@ -317,7 +387,7 @@ def test_an_assessment_is_repeatable_and_of_fresh_approaches(by_hand: PolicyFile
     first, again, other = (judging.assess(by_hand, n_approaches=60, seed=seed).as_dict() for seed in (1, 1, 2))
     assert first == again != other
     text = json.dumps(first, allow_nan=False)
-    assert set(json.loads(text)) == {"box", "plane", "shaped", "go"}
+    assert set(json.loads(text)) == {"box", "plane", "shaped", "go", "vehicles"}
     assert {"landed", "clean"} <= set(first["box"])
     assert {"auc", "calibration_error", "strikes_avoided", "refused_good", "level_out_contacts"} <= set(first["go"])
 
@@ -336,9 +406,49 @@ def test_an_assessment_of_a_family_counts_its_vehicles(by_hand: PolicyFile) -> N
     shares = np.array([four_leg(o).mean() for o in flown])
     assert found.plane.landed.value == pytest.approx(shares.mean())
     assert found.plane.worst_tenth == pytest.approx(np.sort(shares)[:2].mean())
-    assert (found.plane.landed.n, found.plane.n_flights) == (11, 11 * 40)
+    assert found.plane.n_flights == 11 * 40
+    landed = np.stack([four_leg(outcomes) for outcomes in flown])
+    vehicle, approach = np.indices(landed.shape)
+    assert found.plane.landed == share_of_clusters(landed, np.ones(landed.shape), vehicle, approach)
+    # flights of one vehicle are alike: all at once they would seem to tell more
+    assert found.plane.landed.high - found.plane.landed.low > np.ptp(wilson(landed.mean(), landed.size))
+    assert str(found.vehicles) == "11 drawn ones (seed 5); the policy was learned over those of the files"
     assert found.as_dict()["plane"]["landed_worst_tenth"] == found.plane.worst_tenth
     assert "landed_worst_tenth" not in judging.assess(by_hand, n_approaches=20).as_dict()["plane"]
+
+
+def test_several_tasks_tell_no_more_than_their_approaches(by_hand: PolicyFile) -> None:
+    """The same task twice is the same flights twice."""
+    once, twice = (judging.assess(by_hand, [TASK] * n, n_approaches=150, seed=4) for n in (1, 2))
+    assert twice.plane.n_flights == 2 * once.plane.n_flights
+    for name in ("landed", "clean"):
+        one, two = getattr(once.plane, name), getattr(twice.plane, name)
+        assert two.value == one.value
+        assert (two.low, two.high) == pytest.approx((one.low, one.high), abs=0.003)
+    assert once.go is not None
+    assert twice.go is not None
+    for name in ("strikes_avoided", "refused_good", "no_go", "landed_of_flown"):
+        one, two = getattr(once.go, name), getattr(twice.go, name)
+        assert (two.low, two.high) == pytest.approx((one.low, one.high), abs=0.01)
+
+
+def test_a_contact_before_the_refusal_is_none_of_the_level_out(by_hand: PolicyFile) -> None:
+    """A ranger of 10 Hz sees the ceiling late: some approaches touch it before anything is decided, some afterwards."""
+    late = TASK.model_copy(update={"sensing": "ranger10", "estimator": None})
+    found = judging.assess(by_hand, [late], n_approaches=400, seed=3).go
+    assert found is not None
+    world, approaches = Place.of(late).world, Series([PLANE], 3, Purpose.ASSESS).next(400)
+    counts = {"approach": 0, "level_out": 0}
+    for i in range(400):
+        flight = world.trace(
+            approaches.speed_mps[i], approaches.angle_deg[i], *by_hand.values, form="polynomial2",
+            seed=approaches.seed, stream=int(approaches.stream[i]), start="flown",
+        )  # fmt: skip
+        if flight.outcome.no_go and np.isfinite(flight.outcome.t_impact_s):
+            rows = flight.rows[flight.rows.t_s < flight.outcome.t_impact_s]
+            counts[world.phase_name(rows.phase[-1])] += 1
+    assert (found.contacts_before, found.level_out_contacts) == (counts["approach"], counts["level_out"])
+    assert min(counts.values()) > 0
 
 
 def test_a_shaped_approach_has_room_also_where_the_task_asks_for_less(by_hand: PolicyFile) -> None:
@@ -387,8 +497,35 @@ def test_a_sweep_flies_a_policy_as_it_is(by_hand: PolicyFile) -> None:
     assert (learner.result.sigma == 0.0).all()
     searching = sweep_config.load_sweep("sweeps/smoke.yaml", [], [], use.as_it_is(by_hand, "ephe"), learner="ephe")
     assert searching.learner.name == "ephe"
-    with pytest.raises(ConfigError, match=r"vary\.learner\.name"):
-        use.as_it_is(by_hand, None)({"vary": {"learner.name": ["ephe", "bo"]}})
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        (["--vary", "learner.name=ephe,bo"], "vary: learner.name: --policy says what is flown"),
+        (["--vary", "learner.options.n_best=2,3"], "vary: learner.options.n_best: --policy says what is flown"),
+        (["--vary", "policy.r_0_per_s.mu0=4.0,5.0"], "vary: policy.r_0_per_s.mu0: --policy says what is flown"),
+        (["--set", "learner.name=ephe"], "learner.name: value 'ephe': --policy flies without a search"),
+        (["--set", "policy.r_0_per_s.mu0=5.1"], "policy: --policy says the numbers, and a setting says others"),
+        (["--set", "mu0_range.r_0_per_s=[5.0, 5.1]"], "mu0_range"),
+        (["--learner", "ephe", "--vary", "policy.m_0_Nmm.mu0=8.0,9.0"], "vary: policy.m_0_Nmm.mu0"),
+    ],
+)
+def test_a_sweep_of_a_policy_does_not_learn_whoever_asks_for_it(
+    path: Path, tmp_path: Path, capsys: Capture, said: list[str], told: str
+) -> None:
+    out = tmp_path / "run"
+    arguments = ["sweep", "sweeps/smoke.yaml", "--policy", str(path), "--out", str(out), "--dry-run", *said]
+    assert cli.run(arguments) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
+    assert cli.run(arguments[: -len(said)]) == 0
+
+
+def test_a_sweep_may_begin_with_a_policy_and_compare_options_of_a_learner(path: Path) -> None:
+    said = ["--learner", "ephe", "--vary", "learner.options.n_best=2,3", "--dry-run"]
+    assert cli.run(["sweep", "sweeps/smoke.yaml", "--policy", str(path), *said]) == 0
 
 
 def run(arguments: list[str], capsys: Capture, code: int = 0) -> str:
@@ -405,7 +542,7 @@ def test_commands_learn_show_and_judge(tmp_path: Path, capsys: Capture, learned:
     shown = json.loads(run(["policy", "show", str(out), "--json"], capsys))
     assert len(shown["table"]["threshold_per_s"]) == len(shown["table"]["vz_mps"])
     text = run(["policy", "show", str(out)], capsys)
-    for word in ("polynomial2", "r_xx_per_s", "cmaes", "2.3 to 2.7 m/s", "R* (1/s)", f"{learned.crc:08x}"):
+    for word in ("polynomial2", "r_xx_per_s", "cmaes", "2.3 to 2.7 m/s", "R* (1/s)", f"{learned.checksum:08x}"):
         assert word in text
     judged = ["policy", "assess", str(out), "--approaches", "40"]
     own = json.loads(run([*judged, "--json"], capsys))
@@ -424,6 +561,90 @@ def test_a_landing_is_flown_on_what_the_policy_was_learned_on(path: Path, capsys
     assert (slow["end_reason"], slow["no_go"], slow["n_legs"], slow["t_impact_s"]) == ("no_go", 1, 0, None)
     other = ["rollout", "--policy", str(path), "--gear", "narrow_long", "--speed", "2.5", "--angle", "60", "--json"]
     assert json.loads(run(other, capsys))["t_impact_s"] != told["t_impact_s"]
+
+
+def test_the_approach_of_a_policy_is_said_and_never_guessed(path: Path, capsys: Capture) -> None:
+    fly = ["fly", "--uri", "udp://127.0.0.1:9", "--policy", str(path)]
+    for more, told in (
+        ([], "--speed is missing: a policy file says no approach"),
+        (["--speed", "2"], "--angle is missing"),
+        (["--set", "speed_mps=2.0"], "--angle is missing"),
+    ):
+        assert cli.run([*fly, *more]) == 2
+        assert told in capsys.readouterr().err
+    for more in (["--speed", "2", "--angle", "60"], ["experiments/paper_vertical.yaml"]):
+        assert cli.run([*fly, *more]) == 1, "nobody listens there"
+        assert "nobody listens" in capsys.readouterr().err
+
+
+def test_which_of_several_tasks_is_flown_is_said_and_never_guessed(
+    by_hand: PolicyFile, tmp_path: Path, capsys: Capture
+) -> None:
+    others = [TASK.model_copy(update={"gear": gear}) for gear in ("narrow_long", "wide_short")]
+    path, model = tmp_path / "g.yaml", str(tmp_path / "model.txt")
+    file.save(file.make(by_hand.shape, by_hand.values, [TASK, *others], None, None), path)
+    rollout = ["rollout", "--policy", str(path), "--speed", "2.5", "--angle", "60", "--json"]
+    fly = ["fly", "--uri", "udp://127.0.0.1:9", "--policy", str(path), "--speed", "2.5", "--angle", "60"]
+    sil = ["sil", "--policy", str(path), "--write-model", model]
+    for command, wanted in ((rollout, 0), (fly, 1), (sil, 0)):
+        assert cli.run(command) == 2
+        told = capsys.readouterr().err
+        assert "3 tasks that differ in gear (wide_short, narrow_long): say which, for example --set gear=" in told
+        assert told.count("\n") == 1
+        assert cli.run([*command, "--set", "gear=narrow_long"]) == wanted
+        capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        (["--set", "speed_mps=1.2"], "--set speed_mps=1.2: speed_mps cannot be set: the approaches are drawn"),
+        (["--set", "angle_deg=60"], "angle_deg cannot be set"),
+        (["--start", "at_trigger"], "start: value 'at_trigger'"),
+        (["--set", "start=at_trigger"], "start: value 'at_trigger'"),
+    ],
+)
+def test_what_an_assessment_draws_or_cannot_fly_is_not_set(
+    path: Path, capsys: Capture, said: list[str], told: str
+) -> None:
+    assert cli.run(["policy", "assess", str(path), "--approaches", "10", *said]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
+
+
+def test_the_help_of_an_assessment_says_what_is_flown_unless_told(capsys: Capture) -> None:
+    assert cli.run(["policy", "assess", "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert text.count("default: as it was learned") == 7
+    assert "default: habas2021" not in text
+    assert "trigger" not in text
+
+
+def test_an_assessment_says_which_vehicles_fly(learned: PolicyFile) -> None:
+    assert learned.training is not None
+    over = learned.training.model_copy(update={"family": Drawn(n_vehicles=6, seed=1)})
+    family = file.make(learned.shape, learned.values, learned.tasks, over, learned.score)
+    found = judging.assess(family, n_approaches=20)
+    assert str(found.vehicles) == "those of the files; the policy was learned over 6 drawn ones (seed 1)"
+    assert found.as_dict()["vehicles"] == {"drawn": None, "learned_over": {"n_vehicles": 6, "seed": 1}}
+
+
+def test_a_score_says_what_go_no_go_does(learned: PolicyFile) -> None:
+    """It is of every approach flown, and beside it of the same approaches with the policy's own go / no-go."""
+    score, training = learned.score, learned.training
+    assert score is not None
+    assert training is not None
+    approaches = Series(training.regions, training.seed, Purpose.SELECT).next(60)
+    (own,) = fly([Place.of(learned.tasks[0])], learned.form, learned.values, approaches)
+    assert learned.theta["go_p_min"].value > 0
+    assert score.with_go is not None
+    assert score.with_go.refused == (own["no_go"] == 1).mean()
+    assert (score.with_go.landed, score.with_go.clean) == (four_leg(own).mean(), clean(own).mean())
+    (free,) = fly(
+        [Place.of(learned.tasks[0])], learned.form, General(learned.form).always_go(learned.values), approaches
+    )
+    assert (score.landed, score.clean) == (four_leg(free).mean(), clean(free).mean())
 
 
 @pytest.mark.parametrize("more", [["--rrev", "4.8"], ["--moment", "8"], ["--form", "constant"], ["--theta", "4.8,8"]])

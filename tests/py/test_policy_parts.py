@@ -1,13 +1,15 @@
 """The parts of learning a policy for every approach: what is asked of the core, what is drawn, what is fitted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ivl import forms
+from ivl import forms, native
 from ivl.errors import ConfigError
-from ivl.policy import go, start
+from ivl.policy import go, polish, start
 from ivl.policy.flying import Place, PolicyTask, fly, objective
 from ivl.policy.go import Decided
 from ivl.policy.region import BOX, PLANE, Region, Series
@@ -156,6 +158,75 @@ def test_cells_without_a_landing_do_not_bend_the_fit() -> None:
     known = np.full(200, 5.0)
     theta = start.fit(general, Best(vx, vz, known, np.ones(200), 9.0, 0))
     assert general.thresholds(theta, *velocities(9)) == pytest.approx(np.full(200, 5.0), rel=1e-3)
+
+
+def two_ridges(vx: np.ndarray, vz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Instants tau of a wide ridge that follows a plane, and of one that is a little better in every other cell."""
+    wide = 0.26 - 0.02 * vx - 0.015 * vz
+    return wide, wide - 0.09
+
+
+def ridges_map() -> start.Map:
+    """A map that flew nothing: its landings lie on `two_ridges`."""
+    edges = np.linspace(1.5, 3.5, 7), np.linspace(30.0, 90.0, 7)
+    speed, angle = (axis.reshape(-1) for axis in np.meshgrid(*(0.5 * (e[1:] + e[:-1]) for e in edges), indexing="ij"))
+    vx, vz = speed * np.cos(np.radians(angle)), speed * np.sin(np.radians(angle))
+    tau_s = np.linspace(0.1, 0.4, 61)
+    wide, narrow = two_ridges(vx, vz)
+    outcomes = np.zeros((1, tau_s.size, speed.size), dtype=native.library().outcome_dtype)
+    outcomes["triggered"] = 1
+    outcomes["d_trigger_m"] = vz * tau_s[:, None]
+    outcomes["rrev_trigger"] = 1.0 / tau_s[:, None]
+    outcomes["of_y_trigger"] = -vx / outcomes["d_trigger_m"]
+    legs = np.where(np.abs(tau_s[:, None] - wide) < 0.02, 3, 0)
+    legs = np.where((np.abs(tau_s[:, None] - narrow) < 0.008) & (np.arange(speed.size) % 2 == 0), 4, legs)
+    outcomes["n_legs"] = legs
+    outcomes["body_contact"] = legs == 3
+    return start.Map(*edges, tau_s, 0.01, np.array([8.0]), [outcomes])
+
+
+def test_what_is_looked_up_in_a_map_is_what_its_flights_say() -> None:
+    """Of policies with the same threshold everywhere, the map has flown each."""
+    general = General("polynomial2")
+    flown = ridges_map()
+    on_map = polish.OnMap(general, flown, 0.01)
+    (smoothed,) = flown.smoothed()
+    for i in (5, 22, 40):
+        level = general.level(1.0 / flown.tau_s[i] * (1 - 1e-4), 8.0)
+        assert on_map(level) == pytest.approx(smoothed[0, i].mean())
+    early = general.level(5.0, 8.0)
+    early[general.threshold] = [0.6, 0.0, 0.0, 0.0, 0.0, 0.0]
+    assert on_map(early) == 0.0, "it would flip before the approach has its speed"
+
+
+@pytest.mark.parametrize("name", ["polynomial2", "bilinear"])
+def test_a_start_from_the_map_does_not_go_between_two_ridges(name: str) -> None:
+    general = General(name)
+    flown = ridges_map()
+    best = start.best_of(flown)
+    fitted = start.fit(general, best)
+    on_map = polish.OnMap(general, flown, 0.005)
+    (found,) = polish.polish(general, flown, best, fitted, 10.0, [0.005], seed=0)
+    # every other cell is best on the narrow ridge, and a surface through both misses both
+    assert on_map(fitted) < 0.3
+    assert on_map(found) > 0.45
+    assert (found[general.go_p_min :] == fitted[general.go_p_min :]).all()
+    assert (polish.polish(general, flown, best, fitted, 10.0, [0.005], seed=0)[0] == found).all()
+
+
+def test_policies_on_a_map_of_several_moments_take_the_one_between() -> None:
+    general = General("polynomial2")
+    flown = ridges_map()
+    (outcomes,) = flown.flown
+    hopeless = outcomes.copy()
+    hopeless["n_legs"] = 0
+    both = replace(flown, moments_Nmm=np.array([6.0, 8.0]), flown=[np.concatenate([hopeless, outcomes])])
+    on_map = polish.OnMap(general, both, 0.01)
+    at = {moment: on_map(general.level(4.6, moment)) for moment in (5.0, 6.0, 7.0, 8.0, 9.0)}
+    assert [at[5.0], at[6.0]] == pytest.approx([0.0, 0.0], abs=1e-6)  # a vehicle has single precision
+    assert at[7.0] == pytest.approx(0.5 * at[8.0], rel=1e-5)
+    assert at[9.0] == pytest.approx(at[8.0], rel=1e-5)
+    assert at[8.0] > 0.1
 
 
 # ---- go / no-go

@@ -156,10 +156,8 @@ def test_default_folders_are_numbered_and_the_newest_is_resumed(
         run.default_folder(small, None, resume=True)
     first = run.default_folder(small, None, resume=False)
     assert first == Path("runs/small-ephe_robust-seed0")
-    first.mkdir(parents=True)
     second = run.default_folder(small, None, resume=False)
     assert second == Path("runs/small-ephe_robust-seed0-2")
-    second.mkdir()
     assert run.default_folder(small, None, resume=True) == second
     assert run.default_folder(small, 100, resume=False) == Path("runs/small-ephe_robust-seed0-x100")
 

@@ -1,5 +1,4 @@
 import json
-import os
 import sqlite3
 import subprocess
 import sys
@@ -175,7 +174,6 @@ def test_a_folder_with_a_run_is_not_overwritten(run: RunStore) -> None:
     run.close()
     with pytest.raises(StoreError, match="holds a run already: continue it with --resume"):
         RunStore.create(run.folder, "", MANIFEST, DTYPE, LAYOUT)
-    run._lock = os.open(os.devnull, os.O_RDONLY)  # for the fixture to close
 
 
 def test_a_folder_with_something_else_is_not_touched(tmp_path: Path) -> None:
@@ -187,7 +185,7 @@ def test_a_folder_with_something_else_is_not_touched(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "left",
-    ["run.sqlite-journal", "run.sqlite-wal", "run.sqlite-shm", "config.yaml", "config.yaml.part", "manifest.json.part"],
+    ["run.sqlite-journal", "run.sqlite-wal", "run.sqlite-shm", "config.yaml", ".ivl-0123456789abcdef.part.json"],
 )
 def test_a_creation_that_was_cut_off_is_started_over(tmp_path: Path, left: str) -> None:
     (tmp_path / "run.sqlite").write_bytes(b"half a file")
@@ -204,10 +202,8 @@ def test_a_run_is_locked_against_other_processes_until_its_process_ends(run: Run
     command = [sys.executable, "-c", code, str(run.folder)]
     first = subprocess.run(command, capture_output=True, text=True, check=False)
     assert "another process is working on this run" in first.stderr
-    run._db.close()
-    os.close(run._lock)
+    run.close()
     second = subprocess.run(command, capture_output=True, text=True, check=False)
-    run._lock = os.open(os.devnull, os.O_RDONLY)  # for the fixture to close
     assert second.returncode == 0
 
 
@@ -232,7 +228,6 @@ def test_a_run_with_other_outcome_columns_is_refused(run: RunStore) -> None:
     run.close()
     with pytest.raises(StoreError, match="other columns"):
         RunStore.open_existing(run.folder, DTYPE)
-    run._lock = os.open(os.devnull, os.O_RDONLY)  # for the fixture to close
 
 
 def test_a_damaged_database_is_refused(tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_options_settings_and_an_experiment_come_to_the_same_landing(capsys: Cap
     out = world.rollouts(2.5, 90.0, 4.8, 8.0, start="flown")
     assert by_options["t_end_s"] == out.t_end_s[()]
     assert by_options != flown(capsys, "--experiment", ONBOARD, "--speed", "3.5")
-    at_trigger = flown(capsys, "--experiment", ONBOARD, "--start", "at_trigger", "--distance", "0.5")
+    at_trigger = flown(capsys, "--experiment", ONBOARD, "--start", "at_trigger", "--distance", "0.8")
     assert (at_trigger["triggered"], at_trigger["t_trigger_s"] < 0.1) == (1, True)
 
 

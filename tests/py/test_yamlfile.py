@@ -52,9 +52,9 @@ def test_read_names_the_file_when_it_is_not_text(tmp_path: Path) -> None:
         yamlfile.read(tmp_path / "bad.yaml")
 
 
-def test_validate_explains_a_number_that_yaml_reads_as_text() -> None:
-    data = yamlfile.parse("size: 1e-6", "f.yaml")
-    with pytest.raises(ConfigError, match=r"f\.yaml: size: value '1e-6': .*write numbers as 1\.0e-6"):
+def test_validate_explains_a_number_in_quotes() -> None:
+    data = yamlfile.parse("size: '1e-6'", "f.yaml")
+    with pytest.raises(ConfigError, match=r"f\.yaml: size: value '1e-6': .*write the number without them"):
         yamlfile.validate(Sample, data, "f.yaml")
 
 

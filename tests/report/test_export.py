@@ -411,10 +411,10 @@ def test_a_choice_that_does_not_fit_is_refused(tmp_path: Path, learn_run: Path, 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("t_s,p_WB_m_1\n0,1\n", "column p_WB_m_2 is missing: this is no trace"),
-        ("t_s,p_x_W_m\n0,1\n", "column p_y_W_m is missing: this is no table of a flight recorder"),
-        ("t_s,p_x_W_m\n0\n", "2 column names, but 1 numbers in a row"),
-        ("t_s\nabc\n", "cannot be read"),
+        ("t_s,p_WB_m_1\n0,1\n", "column p_WB_m_2 is missing for a trace"),
+        ("t_s,p_x_W_m\n0,1\n", "column p_y_W_m is missing for the table of a flight recorder"),
+        ("t_s,p_x_W_m\n0\n", "line 2: 1 fields, the header has 2"),
+        ("t_s\nabc\n", "line 2: t_s: value 'abc' is no number"),
     ],
 )
 def test_a_file_that_is_something_else_is_named(tmp_path: Path, text: str, message: str) -> None:

@@ -383,3 +383,25 @@ def test_first_flight_of_the_documentation_lands_twice_on_the_same_vehicle():
             assert twice["ivl.trg_seq"] > values["ivl.trg_seq"]
             return
     pytest.fail("the machine was too busy for real time, five times")
+
+
+def test_what_the_vehicle_changes_by_itself_clients_are_told(sil, connected, wait_for):
+    """A configuration that is refused, and a value that is brought into range."""
+    with connected(sil.uri) as cf:
+        wrong = {"tick_hz": 333.0, "h_ceil": 3.3, "attached_s": 7.5, "mass": 0.05, "fence_z_max": 9.0}
+        before = {name: float(cf.param.get_value(f"ivl.{name}")) for name in wrong}
+        for name, value in wrong.items():
+            cf.param.set_value(f"ivl.{name}", value)
+        cf.param.set_value("ivl.commit", 4711)
+        wait_for("the refusal", lambda: sil.get("ivl.cfg_seq") == 4711)
+        assert sil.get("ivl.cfg_status") != 0
+        names = [f"ivl.{name}" for name in cf.param.toc.toc["ivl"]]
+        assert len(names) > 50
+
+        def agree() -> bool:
+            return all(float(cf.param.get_value(name)) == pytest.approx(sil.get(name)) for name in names)
+
+        wait_for("a client that knows what is in force", agree)
+        assert {name: sil.get(f"ivl.{name}") for name in wrong} == pytest.approx(before)
+        cf.param.set_value("hlCommander.vland", -3.0)
+        wait_for("the clamp", lambda: float(cf.param.get_value("hlCommander.vland")) == 0.5)

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import policies
 import pytest
 import yaml
 
@@ -17,8 +18,6 @@ from ivl.learning.loop import LearningRun
 from ivl.links import open_source, pil
 from ivl.native import library
 from ivl.policy import file
-from ivl.policy.flying import PolicyTask
-from ivl.policy.shape import General
 from ivl.source import Plan, WorldSource
 from ivl.store import RunStore
 
@@ -194,20 +193,8 @@ def test_bench_tells_the_speed_against_real_time(capsys: pytest.CaptureFixture[s
 def test_a_policy_for_every_approach_is_flown_by_the_chip(
     speed: str, no_go: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shape = General("polynomial2")
-    theta = shape.level(5.082, 10.0)
-    theta[shape.threshold] = [5.082, 0.253, 1.408, -0.208, 0.379, -0.922]
-    theta[shape.go_p_min] = 0.5
-    theta[shape.go] = [5.0, 4.0, 8.0] + [0.0] * 7
-    task = PolicyTask(
-        vehicle="habas2021",
-        gear="wide_short",
-        gear_set="as_simulated",
-        estimator="known_height_predicted",
-        start="flown",
-    )
     path = tmp_path / "g.yaml"
-    file.save(file.make(shape.form, theta.tolist(), [task], None, None), path)
+    file.save(policies.by_hand(), path)
     words = ["--policy", str(path), "--speed", speed, "--angle", "60", "--json"]
     assert cli(["fly", "--uri", "pil://", *words]) == 0
     told = json.loads(capsys.readouterr().out)

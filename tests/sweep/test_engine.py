@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -15,8 +16,9 @@ import dask_jobqueue  # noqa: F401 - brings its defaults into Dask's configurati
 import pytest
 from small_sweep import SMALL, same_tables, write
 
-from ivl.errors import ConfigError, RolloutError
-from ivl.sweep import cluster, engine, store
+from ivl import native
+from ivl.errors import ConfigError, NativeError, RolloutError
+from ivl.sweep import cluster, engine, store, work
 from ivl.sweep.config import Sweep
 
 HERE = Path(__file__).parent
@@ -211,3 +213,64 @@ def memory_bytes(pid: int) -> int:
             continue  # ended in between
         total_kib += sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
     return total_kib * 1024
+
+
+def test_a_local_cluster_is_its_owner_s_alone() -> None:
+    """Nobody without the certificates, which are in the owner's memory, gets a word in; there is no dashboard."""
+    with cluster.open_client(None, 1) as client:
+        assert client.submit(int, "7").result(DEADLINE_S) == 7
+        address = client.scheduler.address
+        assert address.startswith("tls://127.0.0.1:")
+        assert client.cluster.dashboard_link in ("", None) or "http" not in str(client.scheduler_info()["services"])
+        code = (
+            "import sys, distributed\n"
+            "distributed.Client(sys.argv[1], timeout=3, security=distributed.Security.temporary())\n"
+        )
+        for stranger in (address, address.replace("tls://", "tcp://")):
+            command = [sys.executable, "-c", code, stranger]
+            done = subprocess.run(command, capture_output=True, text=True, check=False, cwd="/")
+            assert done.returncode != 0
+        assert client.submit(int, "8").result(DEADLINE_S) == 8
+
+
+@pytest.mark.parametrize(
+    ("limit", "workers", "message"),
+    [
+        ((resource.RLIMIT_NOFILE, 40), 2, "--workers 2: needs 112 open files, allowed are 40: raise the limit"),
+        ((resource.RLIMIT_RSS, 2**30), 8, "--workers 8: needs 2800 MiB of memory, here are 1024 MiB: use --workers 2"),
+    ],
+)
+def test_what_a_cluster_needs_is_said_before_it_starts(
+    limit: tuple[int, int], workers: int, message: str, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-c", "from ivl.cli import main; main()", "sweep", "sweeps/smoke.yaml"]
+    command += ["--workers", str(workers), "--out", str(tmp_path / "run")]
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(limit[0], (limit[1], limit[1])),
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_task_that_never_ends_is_given_up_with_a_clear_word() -> None:
+    code = (
+        "import time\n"
+        "from ivl.sweep import work\n"
+        "work.run_task = lambda *_: time.sleep(1000)\n"
+        "from ivl import native, numerics\n"
+        "task = type('T', (), {'number': 3})()\n"
+        "work.run_packed(None, b'N.', task, native.library().digest(), numerics.kernel(), 0.2)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == os.EX_TEMPFAIL
+    assert "task 3 takes longer than 0 s: its worker ends" in done.stderr
+
+
+def test_workers_that_compute_otherwise_are_refused(small: Sweep) -> None:
+    with pytest.raises(
+        NativeError, match=r"this worker computes with .*, the client with another: results would differ"
+    ):
+        work.run_packed(small, b"", None, native.library().digest(), "another", 60.0)

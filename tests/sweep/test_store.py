@@ -112,6 +112,14 @@ def test_parts_of_another_version_or_shape_and_torn_ones_are_refused(small: Swee
     run = fly(small, tmp_path / "run", 100)
     path = run / "trials" / "000000.parquet"
     content, table = path.read_bytes(), pq.read_table(path)
+    flipped = bytearray(content)
+    flipped[len(content) // 2] ^= 1
+    for damaged in (content[:-100], b"", bytes(flipped)):
+        path.write_bytes(damaged)
+        with pytest.raises(StoreError, match=r"000000\.parquet: is not as it was written; --resume"):
+            store.read_trials(run)
+        assert 0 not in store.finished_tasks(run)
+    without_digests(run)
     path.write_bytes(content[:-100])
     with pytest.raises(StoreError, match=r"000000\.parquet: cannot be read"):
         store.read_trials(run)
@@ -121,6 +129,32 @@ def test_parts_of_another_version_or_shape_and_torn_ones_are_refused(small: Swee
     pq.write_table(table.append_column("extra", pa.array([0] * table.num_rows)), path)
     with pytest.raises(StoreError, match="other columns than this version's: extra"):
         store.read_trials(run)
+
+
+def without_digests(run: Path) -> None:
+    """Make the run one that was written before tasks vouched for their parts."""
+    manifest = json.loads((run / "manifest.json").read_text())
+    (run / "manifest.json").write_text(json.dumps({**manifest, "vouched": False}))
+    for path in (run / "tasks").glob("*.parquet"):
+        table = pq.read_table(path)
+        kept = {key: value for key, value in table.schema.metadata.items() if key != store.INDEX_KEY}
+        pq.write_table(table.replace_schema_metadata(kept), path)
+
+
+def test_foreign_files_in_a_run_are_no_part_of_it(small: Sweep, tmp_path: Path) -> None:
+    run = fly(small, tmp_path / "run", 5)
+    trials, done = store.read_trials(run), store.finished_tasks(run)
+    part = (run / "trials" / "000000.parquet").read_bytes()
+    for name in ("._000000.parquet", "000000 (1).parquet", "000099.parquet", "x.parquet", ".DS_Store"):
+        (run / "trials" / name).write_bytes(part)
+    (run / "tasks" / "._000000.parquet").write_bytes(b"Mac OS X")
+    assert store.read_trials(run).equals(trials)
+    assert store.finished_tasks(run) == done
+    (run / "tasks" / "000099.parquet").write_bytes((run / "tasks" / "000000.parquet").read_bytes())
+    with pytest.raises(StoreError, match=r"000099\.parquet: is the record of task \[0\]"):
+        store.read_trials(run)
+    store.clear_unfinished(run)
+    assert store.read_trials(run).equals(trials)
 
 
 def test_what_is_no_run_is_said_to_be_none(tmp_path: Path) -> None:
@@ -198,7 +232,7 @@ def test_a_task_counts_only_when_all_its_parts_are_there(small: Sweep, tmp_path:
     run = fly(small, tmp_path / "run", 5)
     n_tasks = len(list((run / "tasks").iterdir()))
     (run / "tasks" / "000001.parquet").unlink()  # cut off before the record
-    (run / "trials" / "000002.parquet.part").write_bytes(b"torn")
+    (run / "trials" / ".ivl-0123456789abcdef.part.parquet").write_bytes(b"torn")
     assert store.finished_tasks(run) == set(range(n_tasks)) - {1}
     store.clear_unfinished(run)
     for kind in ("tasks", "trials", "episodes", "rollouts"):

@@ -189,9 +189,10 @@ def test_what_has_no_place_for_a_varied_path_refuses_it(run: Path) -> None:
 
 def test_parts_of_another_vary_are_refused(run: Path, tmp_path: Path) -> None:
     own = fly(varied(tmp_path, {"approach": ["constant_rrev"]}, **TINY), tmp_path / "run", 100)
-    foreign = next((run / "trials").glob("*.parquet"))
-    (own / "trials" / "000007.parquet").write_bytes(foreign.read_bytes())
-    with pytest.raises(StoreError, match=r"000007\.parquet: other varied paths than in 000000\.parquet"):
+    foreign = max((run / "tasks").glob("*.parquet"))
+    for kind in ("tasks", "trials"):
+        (own / kind / foreign.name).write_bytes((run / kind / foreign.name).read_bytes())
+    with pytest.raises(StoreError, match=rf"{foreign.name}: other varied paths than in 000000\.parquet"):
         store.read_trials(own)
     table = pq.read_table(own / "trials" / "000000.parquet")
     assert table.column("vary.approach").to_pylist() == ["constant_rrev"] * 4
@@ -281,7 +282,7 @@ def test_a_run_from_before_there_was_vary_is_resumed(tmp_path: Path) -> None:
         ("speed_mps=1,200", "vary.speed_mps: 200.0 is out of range (0.1 .. 6 m/s)"),
         ("speed_mps=slow", "vary.speed_mps: value 'slow' is not a number"),
         ("sense.latency=0.0,0.5", "vary.sense.latency=0.5: override: sense.latency: value 0.5 is out of range"),
-        ("sense.latency=0.0,1e-3", "numbers and other values are mixed; YAML reads this as text"),
+        ("sense.latency=0.0,'1e-3'", "numbers and other values are mixed; in quotes this is text"),
         ("estimator=kalmn,formula", "vary.estimator=kalmn: estimator: value 'kalmn': unknown estimator"),
         ("sensing=camera5,mocap", "no sensor set 'camera5', did you mean 'camera50'"),
         ("gear=wide_lng", "no gear 'wide_lng', did you mean 'wide_long'"),

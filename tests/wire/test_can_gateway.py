@@ -22,7 +22,7 @@ from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
 from crtp_double import VALUES, Vehicle, value_of
 
-from ivl.can import gateway, link
+from ivl.can import gateway, link, outbox
 from ivl.can.dbc import Codec
 from ivl.can.gateway import Options, make_gateway
 from ivl.can.link import BusError
@@ -69,6 +69,7 @@ class LossyBus(VirtualBus):
     def __init__(self, channel: str, loss: float = 0.0, seed: int = 1) -> None:
         super().__init__(channel)
         self.loss, self.rng, self.n_lost = loss, random.Random(seed), 0
+        self.is_full, self.n_tried = False, 0
         self.is_in = can.BusState.ACTIVE
 
     @property
@@ -76,6 +77,9 @@ class LossyBus(VirtualBus):
         return self.is_in
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.n_tried += 1
+        if self.is_full and self.n_tried % 3:  # as a queue of a few frames that drains: what is refused goes later
+            raise can.CanOperationError("Failed to transmit: No buffer space available", errno.ENOBUFS)
         if msg.is_extended_id and self.rng.random() < self.loss:
             self.n_lost += 1
         else:
@@ -213,6 +217,24 @@ def test_cflib_connects_reads_writes_and_logs(pair: Any, connect: Any, vehicle: 
     assert vehicle.values[7] == 2.5
     names = ["stateEstimate.z", "ivl.phase", "pm.vbat"]
     assert client.log(names, "fuf") == {n: pytest.approx(VALUES[n.partition(".")[2]]) for n in names}
+    for end in (both.host, both.far):
+        report = end.gateway.report()
+        assert (report["n_bad"], report["n_missing"], report["n_unsent"]) == (0, 0, 0)
+
+
+def test_bus_that_is_full_now_and_then_loses_nothing(
+    pair: Any, connect: Any, vehicle: Vehicle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(outbox, "SEND_S", DEADLINE_S)  # a busy machine tries again late
+    both = pair()
+    client = connect(both.uri)
+    both.host.bus.is_full = both.far.bus.is_full = True
+    for n in range(5):
+        client.set("bench.p07", float(n))
+        assert vehicle.values[7] == n
+    names = [f"bench.u{i:02d}" for i in range(26)]
+    assert client.log(names, "u" * 26) == {name: value_of(name.partition(".")[2]) for name in names}
+    both.host.bus.is_full = both.far.bus.is_full = False
     for end in (both.host, both.far):
         report = end.gateway.report()
         assert (report["n_bad"], report["n_missing"], report["n_unsent"]) == (0, 0, 0)
@@ -381,3 +403,59 @@ def test_the_programs_over_multicast(connect: Any, vehicle: Vehicle) -> None:
     reports = [json.loads(output) for output, _ in outputs]
     assert all(report["n_packets_in"] > 80 for report in reports)
     assert reports[0]["n_given_up"] == 0
+
+
+class StrangeBus(VirtualBus):
+    """What a bus made of network packets may bring: nothing that can be decoded, or a message with odd parts."""
+
+    def __init__(self, channel: str) -> None:
+        super().__init__(channel)
+        self.strange: list[Any] = []
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        if self.strange:
+            odd = self.strange.pop()
+            if isinstance(odd, Exception):
+                raise can.CanOperationError("could not unpack received message") from odd
+            return can.Message(check=False, **odd)
+        return super().recv(timeout)
+
+
+def test_what_is_no_frame_is_counted_and_ends_nothing(vehicle: Vehicle) -> None:
+    channel = f"strange-{id(vehicle)}"
+    bus, other = StrangeBus(channel), LossyBus(channel)
+    host = End(bus, Options(2, listen=("127.0.0.1", free_port()), networked=True))
+    far = End(other, Options(2, to=("127.0.0.1", vehicle.port)))
+    try:
+        wait_for(lambda: host.gateway.report()["up"], "link up")
+        bus.strange = [
+            ValueError("a 1-byte datagram"),
+            {"arbitration_id": -5},
+            {"arbitration_id": "x"},
+            {"is_error_frame": True, "arbitration_id": 0x40},
+        ]
+        wait_for(lambda: not bus.strange and host.gateway.report()["n_bad"] >= 3, "bad frames are counted")
+        assert host.gateway.report()["n_error_frames"] == 1
+        assert host.gateway.report()["up"]
+        assert host.is_alive()
+    finally:
+        for end in (host, far):
+            end.stop()
+            end.bus.shutdown()
+
+
+def test_the_first_client_keeps_the_vehicle(monkeypatch: pytest.MonkeyPatch) -> None:
+    bus = VirtualBus("first-client")
+    try:
+        end: Any = make_gateway(bus, Options(2, listen=("127.0.0.1", 0)))
+        monkeypatch.setattr(gateway, "CLIENT_S", 1e9)
+        end.datagram_received(b"\xf3", ("127.0.0.1", 1))
+        end.datagram_received(b"\x3c\x00", ("127.0.0.1", 2))
+        assert end._client == ("127.0.0.1", 1)
+        assert end.report()["n_foreign"] == 1
+        monkeypatch.setattr(gateway, "CLIENT_S", -1.0)
+        end.datagram_received(b"\xf3", ("127.0.0.1", 2))
+        assert end._client == ("127.0.0.1", 2)
+        assert end.report()["n_foreign"] == 1
+    finally:
+        bus.shutdown()

@@ -1,7 +1,9 @@
 """What a bus tells: frames for people, what passes by, heartbeats, and a bus that is dead."""
 
+import errno
 import math
 import struct
+from collections import deque
 from collections.abc import Iterator
 
 import can
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 
 from ivl import forms
 from ivl.can.dbc import FILE, Codec, RangeError
+from ivl.can.fragments import Joiner
 from ivl.can.link import BusError, CanLink, State
 from ivl.can.telemetry import Observer, Telemetry
 from ivl.errors import ConfigError
@@ -259,3 +262,83 @@ def test_bus_that_takes_nothing_stops(bus: _Bus) -> None:
     with pytest.raises(BusError, match=r"nothing could be sent for 0\.3 s: no buffer space"):
         link.send(PING, 1.5)
     assert link.report()["n_unsent"] == 3
+
+
+# ---- a bus that is full
+
+
+class _ShortQueue(_Bus):
+    """Holds a few frames, as SocketCAN does, each for as long as it takes on the wire; its clock is the test's."""
+
+    def __init__(self, n_max: int = 10, frame_s: float = 150e-6) -> None:
+        super().__init__()
+        self.n_max, self.frame_s, self.t_s = n_max, frame_s, 0.0
+        self._leaves_s: deque[float] = deque()
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        while self._leaves_s and self._leaves_s[0] <= self.t_s:
+            self._leaves_s.popleft()
+        if len(self._leaves_s) >= self.n_max:
+            raise can.CanOperationError("Failed to transmit: No buffer space available", errno.ENOBUFS)
+        super().send(msg, timeout)
+        self._leaves_s.append(max(self.t_s, self._leaves_s[-1] if self._leaves_s else 0.0) + self.frame_s)
+
+
+def _run(bus: _ShortQueue, link: CanLink, seconds: float, burst: list[bytes]) -> list[bytes]:
+    """A burst each 10 ms; the packets that come out at the other end."""
+    joiner = Joiner(0, to_vehicle=False)
+    for step in range(round(seconds * 2000)):
+        bus.t_s = step * 0.0005
+        for packet in burst if step % 20 == 0 else []:
+            link.send(packet, bus.t_s)
+        link.pump(bus.t_s)
+    return [packet for frame in bus.sent if (packet := joiner.join(frame)) is not None]
+
+
+@pytest.mark.parametrize("n_packets", [1, 4, 10, 15])
+@pytest.mark.parametrize("n_max", [1, 3, 10])
+def test_bus_with_a_short_queue_loses_nothing_that_it_has_time_for(n_max: int, n_packets: int) -> None:
+    if n_max == 1:
+        n_packets = min(n_packets, 4)  # one frame each half millisecond
+    bus = _ShortQueue(n_max)
+    link = CanLink(bus, 0, at_host=False)
+    burst = [bytes([0x52]) + bytes([n]) * 28 for n in range(n_packets)]
+    assert _run(bus, link, 1.0, burst) == burst * 100
+    assert (link.report()["n_unsent"], link.is_waiting) == (0, False)
+    bus.shutdown()
+
+
+def test_bus_without_time_gets_whole_packets_and_safety_first() -> None:
+    bus = _ShortQueue(frame_s=0.002)
+    link = CanLink(bus, 0, at_host=False)
+    stream = [bytes([0x52]) + bytes([n]) * 28 for n in range(4)]
+    arrived = _run(bus, link, 2.0, [*stream, b"\x9d\x81\x00\x00"])
+    assert arrived.count(b"\x9d\x81\x00\x00") == 200
+    assert 150 < len(arrived) - 200 < 400
+    report = link.report()
+    # parts of packets are few: a packet is dropped whole, unless its time ends while it is sent
+    n_sent_for_nothing = report["n_frames_out"] - 200 - 4 * (len(arrived) - 200)
+    assert n_sent_for_nothing < 0.1 * report["n_frames_out"]
+    assert report["n_unsent"] > 500
+    bus.shutdown()
+
+
+def test_packet_that_lost_a_frame_is_dropped_with_the_rest_of_it(bus: _Bus) -> None:
+    link = CanLink(bus, 0, at_host=True)
+    room = [2]
+
+    def send(frame: can.Message, timeout: float | None = None) -> None:
+        del timeout
+        if not room[0]:
+            raise OSError(errno.ENOBUFS, "No buffer space available")
+        room[0] -= 1
+        bus.sent.append(frame)
+
+    bus.send = send  # type: ignore[method-assign]
+    link.send(bytes([0x50]) + bytes(30), 0.0)
+    link.send(PING, 0.001)
+    assert (len(bus.sent), link.is_waiting) == (2, True)
+    room[0] = 99
+    assert not link.pump(0.0505)  # the first is too old by now
+    assert link.report()["n_unsent"] == 2
+    assert [frame.arbitration_id & 0xFF for frame in bus.sent] == [0x50, 0x50, 0xFC]

@@ -24,7 +24,7 @@ from ivl.mocap import config as configs
 from ivl.mocap.config import MocapConfig, load
 from ivl.mocap.natnet import NatNetServer
 from ivl.mocap.stream import Mocap
-from ivl.mocap.tracker import request_of
+from ivl.mocap.tracker import Tracker, request_of
 from ivl.mocap.watch import Pose, Status
 
 DEADLINE_S = 60.0
@@ -320,3 +320,45 @@ def test_wrong_options_are_one_line(arguments: list[str], text: str, capsys: pyt
     error = capsys.readouterr().err
     assert text in error
     assert error.count("\n") == 1
+
+
+def test_a_guard_hears_of_it_when_motion_capture_itself_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard: list[Status] = []
+
+    class Listener:
+        def look(self, status: Status, *_: object) -> None:
+            heard.append(status)
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("a fault of the program")
+
+    cameras = Cameras()
+    config = MocapConfig(system="simulator", body=BODY)
+    monkeypatch.setattr(Mocap, "_take", fail)
+    try:
+        with Mocap(config, request=cameras.request) as mocap:
+            mocap.guard = Listener()
+            wait_for(lambda: heard[-3:] == [Status.FAILED] * 3, "the guard is told")
+            assert "motion capture itself failed: ZeroDivisionError" in mocap.state().text
+    finally:
+        cameras.close()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"hello",
+        b"[1]",
+        b"5",
+        b'{"bodies": 3, "t_s": 1}',
+        b'{"t_s": 1, "bodies": {"a": [1, "x"]}}',
+        b'{"bodies": {}}',
+        b"[" * 9999,
+    ],
+)
+def test_a_strange_line_of_the_child_is_counted_and_no_frame(line: bytes) -> None:
+    tracker = Tracker.__new__(Tracker)
+    tracker.failure, tracker.n_strange = "", 0
+    assert tracker._frame(line) is None
+    assert tracker.n_strange == 1
+    assert tracker.failure == ""

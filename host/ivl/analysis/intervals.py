@@ -6,6 +6,8 @@ mean      of the landing rates of n trials. Rollouts of one trial share a policy
           Wilson's interval over all of them would be far too narrow. Rates lie in 0 .. 1, so the variance of one is at
           most p (1 - p): Wilson's interval with the number of *trials* in the place of n covers at least as often as
           it says, however alike the rollouts of a trial are. Nothing has to be estimated from five numbers.
+clusters  share of answers that are alike within clusters, of one kind or of two crossed ones (vehicles, approaches):
+          the variance between them says how many independent answers they are worth, for Wilson's interval.
 contrast  differences of averages over many cells: the variance within each cell, estimated without bias from its
           trials, summed over the cells (a stratified sample). A bootstrap of five trials a cell would give 4/5 of it.
 """
@@ -17,6 +19,9 @@ import numpy.typing as npt
 
 Z95 = 1.959963984540054
 """Two-sided 95 % quantile of the standard normal distribution."""
+_SLACK = 1e-9
+_CLUSTERS_MIN = 4
+"""From so few clusters no variance is estimated."""
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -114,6 +119,64 @@ def difference(first: Estimate, second: Estimate) -> Estimate:
     half = np.hypot(sides[0], sides[1])
     value = first.value - second.value
     return Estimate(value, value - float(half), value + float(half), min(first.n, second.n))
+
+
+def share_of_clusters(happened: npt.ArrayLike, counted: npt.ArrayLike, *clusters: npt.ArrayLike) -> Estimate:
+    """Share of true values among answers that are alike within clusters: flights of one vehicle, or of one approach.
+
+    The variance of the share is that between the clusters, of crossed ones their sum less what both hold (Cameron,
+    Gelbach and Miller 2011). The answers count as so many independent ones as have this variance, but never as more
+    than there are (Kish's design effect). Wilson's interval with that number, and with Student's quantile for the
+    number of clusters, has its level at small shares, too. Where all answers are equal, or fewer than four clusters
+    have any, nothing tells how alike they are, and a cluster counts as one answer. Clusters of unequal size count as
+    fewer equal ones. Where a cluster has one answer each, this is `share_of`.
+
+    Args:
+        happened: True or false, any shape.
+        counted: Which answers count, same shape.
+        *clusters: Number of the cluster of each answer, same shape; one array for each way to cluster.
+
+    Returns:
+        The share; `n` is the number of answers that count.
+    """
+    counts = np.asarray(counted, dtype=bool).ravel()
+    answers = np.asarray(happened, dtype=np.float64).ravel()[counts]
+    n = answers.size
+    if not n:
+        return Estimate(float("nan"), 0.0, 1.0, 0)
+    value = float(answers.mean())
+    found = [np.unique(np.asarray(of).ravel()[counts], return_inverse=True)[1] for of in clusters]
+    sizes = [np.bincount(index) for index in found]
+    fewest = min(n**2 / float(size @ size) for size in sizes)  # as many clusters of equal size
+    if fewest < _CLUSTERS_MIN or value in (0.0, 1.0):
+        low, high = wilson(value, fewest)
+        return Estimate(value, float(low), float(high), n)
+    error = answers - value
+    alone = _between(error, np.arange(n))
+    between = [_between(error, index) for index in found]
+    design = max(alone, *between, sum(between) - (len(between) - 1) * alone) / alone
+    alike = design > 1.0 + _SLACK
+    low, high = wilson(value, n / design, student95(fewest - 1) if alike else Z95)
+    return Estimate(value, float(low), float(high), n)
+
+
+def _between(error: FloatArray, cluster: npt.NDArray[np.intp]) -> float:
+    """Variance of a mean of which `error` are the deviations, from the sums over clusters, but for a common factor."""
+    sums, size = np.bincount(cluster, error), np.bincount(cluster)
+    fewest = error.size**2 / float(size @ size)
+    return float(fewest / (fewest - 1) * (sums @ sums))
+
+
+def student95(freedom: float) -> float:
+    """Two-sided 95 % quantile of Student's t, by its expansion about the normal one; within 1 % from 3 degrees on."""
+    z = Z95
+    terms = (
+        z,
+        (z**3 + z) / 4,
+        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
+        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
+    )
+    return sum(term / freedom**i for i, term in enumerate(terms))
 
 
 def worst_tenth(rates: npt.ArrayLike) -> float:

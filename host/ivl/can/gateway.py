@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,12 +18,18 @@ from ivl.can import requests
 from ivl.can.link import BusError, CanLink, State
 from ivl.can.repeat import LogMemory, Repeater
 from ivl.can.telemetry import Telemetry
+from ivl.errors import IvlError
 
 TICK_S = 0.01
+AGAIN_S = 0.0005
+"""A bus that is full is tried again after so long: a classic frame takes a fifth of that."""
 TELEMETRY_S = 0.05
 STOP_S = 10.0
 """A thread that reads a bus without a file ends within 0.1 s, on a busy machine later; it must not outlive the loop."""
 PACKET_MAX = 31
+CLIENT_S = 1.0
+"""A client that is silent for so long has gone, as for the software vehicle; until then no other one is heard."""
+_ID_MAX, _DATA_MAX = 2**29 - 1, 64
 _SCAN = b"\xff"
 """A packet without a port that cflib sends to find vehicles; whoever sends it is no client yet."""
 _REFUSED = bytes([0x91, 0x81, 0, 0])
@@ -41,6 +48,7 @@ class Options:
         to: At the vehicle: its UDP port. None at the host.
         fd: One CAN FD frame for a packet, instead of up to four classic frames.
         allow_arming: Let requests to arm the motors pass.
+        networked: The bus is made of network packets, which anybody may have sent: an error frame says nothing then.
     """
 
     node: int
@@ -48,6 +56,7 @@ class Options:
     to: Address | None = None
     fd: bool = False
     allow_arming: bool = False
+    networked: bool = False
 
 
 class Gateway(ABC, asyncio.DatagramProtocol):
@@ -60,9 +69,10 @@ class Gateway(ABC, asyncio.DatagramProtocol):
         self.options = options
         self.n_packets_in = self.n_packets_out = self.n_dropped = self.n_arming_refused = 0
         self._bus = bus
-        self._link = CanLink(bus, options.node, self.at_host, options.fd)
+        self._link = CanLink(bus, options.node, self.at_host, options.fd, not options.networked)
         self._udp: asyncio.DatagramTransport | None = None
         self._failed: asyncio.Future[None] | None = None
+        self._is_pumping = False
 
     async def run(self) -> None:
         """Run until the task is cancelled.
@@ -73,7 +83,8 @@ class Gateway(ABC, asyncio.DatagramProtocol):
         """
         loop = asyncio.get_running_loop()
         self._failed = loop.create_future()
-        notifier = can.Notifier(self._bus, [_Frames(self)], timeout=0.1, loop=loop)
+        tolerant: Any = _Tolerant(self._bus, self._link.count_bad)
+        notifier = can.Notifier(tolerant, [_Frames(self)], timeout=0.1, loop=loop)
         loop.set_exception_handler(lambda _, context: self._fail(context.get("exception") or context["message"]))
         ticking = asyncio.ensure_future(self._tick_forever())
         try:
@@ -126,12 +137,24 @@ class Gateway(ABC, asyncio.DatagramProtocol):
     async def _tick_forever(self) -> None:
         while True:
             await self._tick(time.monotonic())
+            self._try_again_soon()
             await asyncio.sleep(TICK_S)
 
     def _to_bus(self, packets: list[bytes], now_s: float) -> None:
         for packet in packets:
             self.n_packets_out += 1
             self._link.send(packet, now_s)
+        self._try_again_soon()
+
+    def _try_again_soon(self) -> None:
+        if self._link.is_waiting and not self._is_pumping:
+            self._is_pumping = True
+            asyncio.get_running_loop().call_later(AGAIN_S, self._pump)
+
+    def _pump(self) -> None:
+        self._is_pumping = False
+        self._link.pump(time.monotonic())
+        self._try_again_soon()
 
     def _own_state(self, now_s: float) -> State:
         return State.RUNNING if self._link.hears_peer(now_s) else State.PEER_LOST
@@ -144,7 +167,8 @@ class Gateway(ABC, asyncio.DatagramProtocol):
     def _fail(self, error: Any) -> None:
         assert self._failed is not None
         if not self._failed.done():
-            self._failed.set_exception(error if isinstance(error, Exception) else BusError(f"gateway: {error}"))
+            known = isinstance(error, (IvlError, OSError))
+            self._failed.set_exception(error if known else BusError(f"gateway: {type(error).__name__}: {error}"))
 
     def _close(self) -> None:
         if self._udp is not None:
@@ -162,6 +186,8 @@ class HostGateway(Gateway):
         super().__init__(bus, options)
         self._repeater = Repeater()
         self._client: Any = None
+        self._t_client_s = float("-inf")
+        self.n_foreign = 0
 
     @property
     def n_repeated(self) -> int:
@@ -170,10 +196,10 @@ class HostGateway(Gateway):
 
     def report(self) -> dict[str, Any]:
         """State of the link and counts since the start."""
-        return {**super().report(), "n_given_up": self._repeater.n_given_up}
+        return {**super().report(), "n_given_up": self._repeater.n_given_up, "n_foreign": self.n_foreign}
 
     def datagram_received(self, data: bytes, address: Any) -> None:
-        """A client has sent a packet; the sender of the last one is the client."""
+        """A client has sent a packet; the first one keeps the vehicle until it is silent."""
         now_s = time.monotonic()
         if data == _SCAN:
             self._answer(_SCAN, address)
@@ -182,8 +208,12 @@ class HostGateway(Gateway):
             self.n_dropped += 1
             return
         if address != self._client:
+            if self._client is not None and now_s - self._t_client_s <= CLIENT_S:
+                self.n_foreign += 1
+                return
             self._client = address
             self._repeater.clear()
+        self._t_client_s = now_s
         if self._may_pass(data):
             self._to_bus(self._repeater.offer(data, now_s), now_s)
         else:
@@ -270,7 +300,45 @@ class VehicleGateway(Gateway):
             if not self._has_vehicle:
                 self._udp.sendto(_SCAN)
             for frame in self._telemetry.frames(now_s):
-                self._link.put(frame, now_s)
+                self._link.show(frame, now_s)
+
+
+class _Tolerant:
+    """A bus on which what is no frame is counted, and not an error that ends the reader."""
+
+    def __init__(self, bus: can.BusABC, on_bad: Callable[[], None]) -> None:
+        self._bus, self._on_bad = bus, on_bad
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._bus, name)
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        """The next frame, if there is one.
+
+        Raises:
+            can.CanError: The bus failed.
+        """
+        try:
+            frame = self._bus.recv(timeout)
+        except can.CanError as error:
+            if error.__cause__ is None or isinstance(error.__cause__, OSError):
+                raise
+            frame = None  # it could not be decoded
+            self._on_bad()
+        except (ValueError, TypeError, KeyError, AttributeError):
+            frame = None
+            self._on_bad()
+        if frame is None or _is_frame(frame):
+            return frame
+        self._on_bad()
+        return None
+
+
+def _is_frame(frame: Any) -> bool:
+    """Whether its parts are what they must be; an interface made of packets takes them as they were sent."""
+    number, data = frame.arbitration_id, frame.data
+    is_number = isinstance(number, int) and 0 <= number <= _ID_MAX
+    return is_number and isinstance(data, (bytes, bytearray)) and len(data) <= _DATA_MAX
 
 
 class _Frames(can.Listener):

@@ -7,12 +7,16 @@ import can
 
 from ivl.can.dbc import Codec
 from ivl.can.fragments import Joiner, Splitter
+from ivl.can.ident import PRIO_SAFETY, prio_of
+from ivl.can.outbox import N_PRIORITIES, Outbox
 from ivl.errors import LinkError
 
 HEARTBEAT_S = 0.1
 TIMEOUT_S = 0.3
 """Without a heartbeat of the other end for so long, the link is down."""
-SEND_S = 0.05
+TRY_S = 0.001
+"""An interface may wait so long for room in its queue; what it refuses then is tried again later."""
+_FOR_PEOPLE = N_PRIORITIES - 1
 _U16 = 0xFFFF
 
 _ERROR_CONTROLLER, _ERROR_BUS_OFF = 0x004, 0x040
@@ -39,16 +43,17 @@ class BusError(LinkError):
 class CanLink:
     """One end, at the host or at the vehicle; times are given by the caller."""
 
-    def __init__(self, bus: can.BusABC, node: int, at_host: bool, fd: bool = False) -> None:
-        """Speak with the other end of `node`'s link on `bus`."""
+    def __init__(self, bus: can.BusABC, node: int, at_host: bool, fd: bool = False, heeds_errors: bool = True) -> None:
+        """Speak with the other end of `node`'s link on `bus`; `heeds_errors`: error frames come from a controller."""
+        self._heeds_errors = heeds_errors
         self._bus, self.codec = bus, Codec(node)
         self._splitter, self._joiner = Splitter(node, at_host, fd), Joiner(node, not at_host)
         self._own, self._peer = ("HEARTBEAT_HOST", "HEARTBEAT_VEHICLE")[:: 1 if at_host else -1]
         self._next_beat_s = self._t_heard_s = float("-inf")
-        self._t_refused_s: float | None = None
+        self._outbox = Outbox(lambda frame: bus.send(frame, timeout=TRY_S))
         self._peer_state: State | None = None
         self._n_beats = 0
-        self.n_frames_in = self.n_frames_out = self.n_unsent = self.n_error_frames = 0
+        self.n_frames_in = self.n_error_frames = 0
 
     def hears_peer(self, t_s: float) -> bool:
         """Whether the other end was heard in time."""
@@ -65,30 +70,41 @@ class CanLink:
         return str(self._peer_state) if self.hears_peer(t_s) else f"silent for {t_s - self._t_heard_s:.1f} s"
 
     def send(self, packet: bytes, t_s: float) -> None:
-        """Send a packet of 1 .. 31 bytes.
+        """Send a packet of 1 .. 31 bytes, now or as soon as the bus takes it; see `Outbox`.
 
         Raises:
             BusError: Nothing could be sent for a while.
         """
-        for frame in self._splitter.split(packet):
-            self.put(frame, t_s)
+        self._put(self._splitter.split(packet), prio_of(packet[0]), t_s)
 
-    def put(self, frame: can.Message, t_s: float) -> None:
-        """Send one frame; one that the bus does not take is lost, and counted.
+    def show(self, frame: can.Message, t_s: float) -> None:
+        """Send a frame that people look at, after all others (errors as `send`)."""
+        self._put([frame], _FOR_PEOPLE, t_s)
+
+    def pump(self, t_s: float) -> bool:
+        """Send what waits; returns whether anything still does.
 
         Raises:
             BusError: Nothing could be sent for a while.
         """
-        try:
-            self._bus.send(frame, timeout=SEND_S)
-        except can.CanError as error:
-            self.n_unsent += 1
-            self._t_refused_s = t_s if self._t_refused_s is None else self._t_refused_s
-            if t_s - self._t_refused_s >= TIMEOUT_S:
-                raise BusError(f"CAN bus: nothing could be sent for {TIMEOUT_S:g} s: {error}; {_ADVICE}") from error
-            return
-        self._t_refused_s = None
-        self.n_frames_out += 1
+        self._outbox.pump(t_s)
+        self._check_outbox(t_s)
+        return self._outbox.is_waiting
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether the bus has not taken all that was sent."""
+        return self._outbox.is_waiting
+
+    def _check_outbox(self, t_s: float) -> None:
+        if self._outbox.refused_s(t_s) >= TIMEOUT_S:
+            error = self._outbox.error
+            self._outbox.drop_all()
+            raise BusError(f"CAN bus: nothing could be sent for {TIMEOUT_S:g} s: {error}; {_ADVICE}")
+
+    def _put(self, frames: list[can.Message], prio: int, t_s: float) -> None:
+        self._outbox.put(frames, prio, t_s)
+        self._check_outbox(t_s)
 
     def take(self, frame: can.Message, t_s: float) -> bytes | None:
         """Take a frame of the bus; the packet that it completes, if it does.
@@ -99,18 +115,23 @@ class CanLink:
         self.n_frames_in += 1
         if frame.is_error_frame:
             self.n_error_frames += 1
-            _check_error_frame(frame)
+            if self._heeds_errors:
+                _check_error_frame(frame)
             return None
         packet = self._joiner.join(frame)
         if packet is None:
             self._take_heartbeat(frame, t_s)
         return packet
 
+    def count_bad(self) -> None:
+        """Something came that was no frame."""
+        self._joiner.counts.n_bad += 1
+
     def beat(self, state: State, n_repeated: int, t_s: float) -> None:
         """Look at the bus and send a heartbeat, whenever it is time for it.
 
         Raises:
-            BusError: As `put` and `take`.
+            BusError: As `send` and `take`.
         """
         if t_s < self._next_beat_s:
             return
@@ -129,15 +150,15 @@ class CanLink:
             "n_bad": min(counts.n_bad, _U16),
             "n_repeated": min(n_repeated, _U16),
         }
-        self.put(self.codec.encode(self._own, values), t_s)
+        self._put([self.codec.encode(self._own, values)], PRIO_SAFETY, t_s)
 
     def report(self) -> dict[str, int]:
         """Counts since the start."""
         return {
             **asdict(self._joiner.counts),
             "n_frames_in": self.n_frames_in,
-            "n_frames_out": self.n_frames_out,
-            "n_unsent": self.n_unsent,
+            "n_frames_out": self._outbox.n_sent,
+            "n_unsent": self._outbox.n_unsent,
             "n_error_frames": self.n_error_frames,
         }
 

@@ -3,10 +3,15 @@
 Exit codes: 0 success, 1 the work failed, 2 wrong usage or configuration, 130 interrupted.
 """
 
+import errno
+import os
+import sqlite3
 import sys
+from contextlib import suppress
 
 import typer
 
+from ivl import files
 from ivl.cli import (
     bench,
     can_gateway,
@@ -79,13 +84,38 @@ def run(arguments: list[str] | None = None) -> int:
         return _fail(f"{error.format_message().replace('Value error, ', '')} (try `{command} --help`)", 2)
     except (KeyboardInterrupt, typer.Abort):
         return 130
+    except BrokenPipeError:
+        return 1  # whoever read the output has gone, as `head` does: nobody is left to tell
+    except OSError as error:
+        return _fail(f"{error.filename or 'output'}: {files.reason(error)}", 1)
+    except MemoryError:
+        return _fail("there is not enough memory for this: ask for less at once, or raise the limit (ulimit -v)", 1)
+    except sqlite3.Error as error:
+        return _fail(f"a database failed: {error}", 1)
 
 
 def main() -> None:
     """Entry point of the `ivl` program."""
-    sys.exit(run())
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None and hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a terminal without ± or Greek letters shows their codes
+    code = run()
+    sys.exit(_flush(code))
+
+
+def _flush(code: int) -> int:
+    """Bring out what was printed; whoever cannot be told in words is told by the exit code."""
+    if sys.stdout is None:
+        return code
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python would try again at its end
+        return 1 if error.errno == errno.EPIPE else _fail(f"output: {files.reason(error)}", 1)
+    return code
 
 
 def _fail(message: str, code: int) -> int:
-    console.err.print(f"ivl: {message}", style="red", highlight=False, markup=False, soft_wrap=True)
+    with suppress(OSError):
+        console.err.print(f"ivl: {' '.join(message.splitlines())}", style="red")
     return code

@@ -56,7 +56,7 @@ def bench(
         console.print_json(result)
     else:
         for name, value in result.items():
-            console.out.print(f"{name:28s} {console.number(value, 1)}", highlight=False)
+            console.out.print(f"{name:28s} {console.number(value, 1)}")
 
 
 def measure(world: World, n: int) -> dict[str, Any]:

@@ -28,6 +28,8 @@ Examples:
       the frames that people look at, for candump and SavvyCAN
 """
 _REPORT_S = 0.2
+_FULL_S = 5.0
+_NETWORKED = "udp_multicast"
 
 
 def can_gateway(
@@ -61,7 +63,9 @@ def can_gateway(
         raise ConfigError("exactly one of --listen (end at the host) and --to (end at the vehicle) is needed")
     if interface is None:
         raise ConfigError("--interface is needed, and for most interfaces --channel")
-    options = gateway.Options(node, _address(listen, "--listen"), _address(to, "--to"), fd, allow_arming)
+    options = gateway.Options(
+        node, _address(listen, "--listen"), _address(to, "--to"), fd, allow_arming, interface == _NETWORKED
+    )
     bus = _open_bus(interface, channel, bitrate, data_bitrate, fd, bus_options or [])
     try:
         end = gateway.make_gateway(bus, options)
@@ -103,6 +107,8 @@ def _open_bus(
     import can
 
     settings: dict[str, Any] = {"bitrate": bitrate, "data_bitrate": data_bitrate, "fd": fd or None}
+    if interface == _NETWORKED:
+        settings["hop_limit"] = 0  # frames stay on this machine unless somebody says otherwise
     for text in more:
         name, equals, value = text.partition("=")
         if not equals or not name:
@@ -120,13 +126,20 @@ async def _serve(end: Any) -> None:
     running = asyncio.ensure_future(end.run())
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, running.cancel)
-    said = None
+    said, n_unsent, t_full_s = None, 0, float("-inf")
     while not running.done():
         await asyncio.wait({running}, timeout=_REPORT_S)
         report = end.report()
+        if report["n_unsent"] > n_unsent and loop.time() - t_full_s >= _FULL_S:
+            text = (
+                f"the bus is full: {report['n_unsent'] - n_unsent} frames were not sent; log less, or give the "
+                "interface a longer queue (SocketCAN: ip link set can0 txqueuelen 1000)"
+            )
+            n_unsent, t_full_s = report["n_unsent"], loop.time()
+            console.err.print(f"node {end.options.node}: {text}", highlight=False, soft_wrap=True)
         if report["up"] != said and not running.done():
             said = report["up"]
             text = "link up" if said else f"link down, other end: {report['peer']}"
-            console.err.print(f"node {end.options.node}: {text}", highlight=False, soft_wrap=True)
+            console.err.print(f"node {end.options.node}: {text}")
     if not running.cancelled():
         running.result()

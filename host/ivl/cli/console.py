@@ -1,23 +1,29 @@
-"""What the commands print: progress and messages on stderr, results on stdout, `--json` exactly one object."""
+"""What the commands print: progress and messages on stderr, results on stdout, `--json` exactly one object.
+
+Both consoles print text as it is: no path, name or message of a user is markup. What is to look otherwise is a
+`rich.text.Text`.
+"""
 
 import json
 from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.text import Text
 
 from ivl.forms import Form
 from ivl.learning.loop import Progress
 
-out = Console()
-err = Console(stderr=True)
+_LITERAL: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False, "soft_wrap": True}
+out = Console(**_LITERAL)
+err = Console(stderr=True, **_LITERAL)
 
 _SHOWN_MAX = 4  # parameters in a line of progress
 
 
 def say(text: str) -> None:
     """One line for people, on stderr."""
-    err.print(text, highlight=False, markup=False, soft_wrap=True)
+    err.print(text)
 
 
 def print_json(data: dict[str, Any]) -> None:
@@ -29,18 +35,16 @@ def print_episode(progress: Progress, form: Form) -> None:
     """One line of live progress: episode, mu +- sigma of the first parameters, landing rate, rollouts per second."""
     mu = np.mean([row.mu for row in progress.rows], axis=0)
     sigma = np.mean([row.sigma for row in progress.rows], axis=0)
-    policy = "  ".join(
-        f"{p.symbol} [bold]{mu[i]:5.2f}[/] ± {sigma[i]:4.2f} {p.unit}" for i, p in enumerate(form.params[:_SHOWN_MAX])
+    policy = Text("  ").join(
+        Text.assemble(f"{p.symbol} ", (f"{mu[i]:5.2f}", "bold"), f" ± {sigma[i]:4.2f} {p.unit}")
+        for i, p in enumerate(form.params[:_SHOWN_MAX])
     )
-    policy += f"  (and {form.n - _SHOWN_MAX} more)" if form.n > _SHOWN_MAX else ""
+    policy.append(f"  (and {form.n - _SHOWN_MAX} more)" if form.n > _SHOWN_MAX else "")
     rate = f"{100 * progress.rate_recent:3.0f} %" if np.isfinite(progress.rate_recent) else "  - "
     trials = f"  (mean of {len(progress.rows)} trials)" if len(progress.rows) > 1 else ""
-    err.print(
-        f"episode {progress.episode:3d}/{progress.n_episodes}  {policy}  landing rate {rate}  "
-        f"{progress.rollouts_per_s:7.0f} rollouts/s{trials}",
-        highlight=False,
-        soft_wrap=True,
-    )
+    before = f"episode {progress.episode:3d}/{progress.n_episodes}  "
+    after = f"  landing rate {rate}  {progress.rollouts_per_s:7.0f} rollouts/s{trials}"
+    err.print(Text.assemble(before, policy, after))
 
 
 def number(value: float | None, digits: int = 2) -> str:

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
+from rich.text import Text
 
 from ivl import experiment
 from ivl.cli import console
@@ -57,6 +58,6 @@ def doctor(
 def _print(found: list["Check"]) -> None:
     table = Table("", "check", "found", "needed", "what to do", box=None, pad_edge=False)
     for check in found:
-        mark = "[green]PASS[/]" if check.ok else "[bold red]FAIL[/]"
+        mark = Text("PASS", "green") if check.ok else Text("FAIL", "bold red")
         table.add_row(mark, check.name, check.found, check.needed, "" if check.ok else check.remedy)
-    console.out.print(table, highlight=False)
+    console.out.print(table, soft_wrap=False)

@@ -66,7 +66,7 @@ def estimate(
             {"runs": runs, "seed": seed, "vehicle": vehicle, "cells": [cell.as_dict() for cell in cells]}
         )
         return
-    console.out.print(_table(cells))
+    console.out.print(_table(cells), soft_wrap=False)
 
 
 def _table(cells: list[estimation.Cell]) -> Table:

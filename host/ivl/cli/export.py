@@ -55,9 +55,9 @@ def export(
     if as_json:
         console.print_json({"title": flight.title, "rows": len(flight), "files": [str(file) for file in files]})
         return
-    console.out.print(f"{flight.title}: {len(flight)} rows", highlight=False, soft_wrap=True)
+    console.out.print(f"{flight.title}: {len(flight)} rows")
     for file in files:
-        console.out.print(str(file), highlight=False, soft_wrap=True)
+        console.out.print(str(file))
 
 
 def _default_path(landing: Path, kind: Format) -> Path:

@@ -46,9 +46,9 @@ def figs(
     suffixes = (".svg" if svg else ".pdf", ".png")
     drawn = paper.draw_all(data, out or runs[0] / "figures", chosen, suffixes, only, dpi)
     for name, reason in drawn.left_out.items():
-        console.err.print(f"{name}: not drawn: {reason}", style="yellow", highlight=False, soft_wrap=True)
+        console.err.print(f"{name}: not drawn: {reason}", style="yellow")
     if as_json:
         console.print_json({"files": [str(path) for path in drawn.files], "left_out": drawn.left_out})
         return
     for path in drawn.files:
-        console.out.print(str(path), highlight=False, soft_wrap=True)
+        console.out.print(str(path))

@@ -32,10 +32,10 @@ def flash(
     checked = flasher.check_image(image)
     if not (checked.has_app or any_image):
         raise ConfigError(f"{image}: the inverted-landing app is not in this image (--any flashes it all the same)")
-    console.err.print(f"flashing {image}, {checked.n_bytes} bytes, to {uri}", highlight=False, soft_wrap=True)
+    console.err.print(f"flashing {image}, {checked.n_bytes} bytes, to {uri}")
     flasher.flash(uri, checked, _show)
-    console.err.print("flashed; the vehicle restarts", highlight=False)
+    console.err.print("flashed; the vehicle restarts")
 
 
 def _show(what: str, percent: int) -> None:
-    console.err.print(f"{percent:3d} %  {what}", highlight=False, soft_wrap=True)
+    console.err.print(f"{percent:3d} %  {what}")

@@ -6,8 +6,9 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from ivl import experiment, outcome
+from ivl import experiment, files, outcome
 from ivl.cli import console, policy_options
+from ivl.cli.task_options import FLAGS
 from ivl.errors import ConfigError, LinkError
 from ivl.experiment import Experiment
 from ivl.links import pil
@@ -16,6 +17,7 @@ from ivl.mocap import config as mocap_config
 from ivl.policy import use
 from ivl.policy.file import PolicyFile
 from ivl.rewards import TOTAL, RewardChoice
+from ivl.settings import parse_setting
 from ivl.source import Plan
 from ivl.task import Task
 
@@ -23,9 +25,9 @@ _USUAL = "experiments/paper_vertical.yaml"
 
 HELP = """Fly one landing with a vehicle, and print what it latched at the trigger and how it ended.
 
-The approach is that of EXPERIMENT (default: the paper's vertical one; with --policy, what the policy was learned on). A
-drone takes off, flies to the start point and asks the operator for the outcome; a software vehicle is reset into the
-air and knows the outcome itself.
+The approach is that of EXPERIMENT, by default the paper's vertical one. With --policy and no EXPERIMENT the vehicle is
+what the policy was learned on, and --speed and --angle say the approach. A drone takes off, flies to the start point
+and asks the operator for the outcome; a software vehicle is reset into the air and knows the outcome itself.
 
 \b
 Examples:
@@ -79,7 +81,7 @@ def fly(
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
     tracker = mocap_config.load(mocap) if mocap else None
-    # one landing is also of interest in another world; it is told
+    # one landing is also of interest in another world; the vehicle's site warns of it
     options = Options(
         mocap=tracker, rehearse=rehearse, other_world=True, keep_recordings=csv is not None, say=console.say
     )
@@ -87,7 +89,7 @@ def fly(
         landing = source.fly_one(Rollout(tuple(values), seed, stream))
         end_reason = source.world.end_reason(int(landing.outcome["end_reason"][0]))
     if csv is not None and landing.recording is not None:
-        csv.write_text(landing.recording.to_csv(), encoding="utf-8")
+        files.write(csv, landing.recording.to_csv())
     result = {"snapshot": _snapshot(landing), "outcome": _outcome(landing.outcome, end_reason)}
     _print(result, source.warnings, as_json)
 
@@ -96,10 +98,18 @@ def _experiment(
     learned: PolicyFile | None, path: str | None, settings: list[str], **approach: float | None
 ) -> Experiment:
     """What is flown: the experiment that is named, or what the policy was learned on, or the paper's approach."""
-    change = None
-    if learned is not None:
-        change = use.on_its_task(learned) if path is None else use.as_start(learned)
-    return experiment.load(path or _USUAL, settings, change, **approach)
+    if learned is None:
+        return experiment.load(path or _USUAL, settings, None, **approach)
+    if path is not None:
+        return experiment.load(path, settings, use.as_start(learned), **approach)
+    said = {parse_setting(setting)[0] for setting in settings}
+    for name, value in approach.items():
+        if value is None and name not in said:
+            raise ConfigError(f"{FLAGS[name][0]} is missing: a policy file says no approach")
+    n_tasks = range(len(learned.tasks))
+    found = [experiment.load(_USUAL, settings, use.on_its_task(learned, i), **approach) for i in n_tasks]
+    use.the_one([each.task() for each in found])
+    return found[0]
 
 
 def _refuse(uri: str, options: dict[str, Any]) -> None:
@@ -132,7 +142,7 @@ def _print(result: dict[str, Any], warnings: list[str], as_json: bool) -> None:
         console.out.print(title, style="bold")
         for name, value in values.items():
             text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
-            console.out.print(f"  {name:24s} {text}", highlight=False, soft_wrap=True)
+            console.out.print(f"  {name:24s} {text}")
 
 
 def _snapshot(landing: Any) -> dict[str, Any]:

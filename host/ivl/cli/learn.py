@@ -9,7 +9,7 @@ import typer
 
 from ivl import experiment, run
 from ivl.cli import console, policy_options
-from ivl.errors import ConfigError
+from ivl.errors import ConfigError, IvlError
 from ivl.experiment import Experiment
 from ivl.links.options import Options
 from ivl.mocap import config as mocap_config
@@ -89,18 +89,17 @@ def learn(
     try:
         result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight)
     except KeyboardInterrupt:
-        console.err.print(
-            f"interrupted; continue with: ivl learn --resume --out {folder}{f' --uri {uri}' if uri else ''}"
-            f"{f' --mocap {mocap}' if mocap else ''}{' --other-world' if other_world else ''}",
-            highlight=False,
-            soft_wrap=True,
-        )
+        words = ["ivl", "learn", "--resume", "--out", str(folder)]
+        words += [*(("--uri", uri) if uri else ()), *(("--mocap", mocap) if mocap else ())]
+        console.say(f"interrupted; continue with: {shlex.join([*words, *(['--other-world'] if other_world else [])])}")
         raise
-    pictures = _draw(result) if n_trials is None else []
+    pictures, failure = _draw(result) if n_trials is None else ([], None)
     if as_json:
         console.print_json(result.summary)
     else:
         _report(result, pictures)
+    if failure:
+        raise failure
 
 
 def _start_hint(path: str, settings: list[str], uri: str) -> str:
@@ -132,18 +131,25 @@ def _choose(
 
 
 def _announce(folder: Path) -> None:
-    console.err.print(f"run folder: {folder}", highlight=False, soft_wrap=True)
+    console.err.print(f"run folder: {folder}")
 
 
 def _stage(stage: int, n_stages: int) -> None:
-    console.err.print(f"judging: best possible policy, stage {stage + 1} of {n_stages}", highlight=False)
+    console.err.print(f"judging: best possible policy, stage {stage + 1} of {n_stages}")
 
 
-def _draw(result: run.RunResult) -> list[Path]:
-    """Pictures of a single run; matplotlib is loaded only here, it takes a second."""
-    from ivl.plots import convergence, strobe
+def _draw(result: run.RunResult) -> tuple[list[Path], IvlError | None]:
+    """Pictures of a single run, and why they are not all there; the result is told before that is."""
+    pictures: list[Path] = []
+    try:
+        from ivl.plots import convergence, strobe  # matplotlib takes a second to load
 
-    return [*convergence.draw_run(result), *strobe.draw_last_landing(result)]
+        pictures += convergence.draw_run(result)
+        pictures += strobe.draw_last_landing(result)
+    except Exception as error:  # noqa: BLE001 - whatever a picture raises, it is reported after the result
+        what = str(error) if isinstance(error, IvlError) else f"{type(error).__name__}: {error}"
+        return pictures, IvlError(f"the run is complete in {result.folder}, but a picture is missing: {what}")
+    return pictures, None
 
 
 def _report(result: run.RunResult, pictures: list[Path]) -> None:
@@ -160,7 +166,7 @@ def _report(result: run.RunResult, pictures: list[Path]) -> None:
     lines.append(("run folder", str(result.folder)))
     lines.extend(("picture", str(picture)) for picture in pictures)
     for name, text in lines:
-        console.out.print(f"{name:36s} {text}", highlight=False, soft_wrap=True)
+        console.out.print(f"{name:36s} {text}")
 
 
 def _lines_of_one(summary: dict[str, Any], experiment: Experiment) -> list[tuple[str, str]]:

@@ -47,13 +47,13 @@ def list_(
         console.print_json(found)
         return
     for name, entries in found.items():
-        console.out.print(f"[bold]{name}[/]")
+        console.out.print(name, style="bold")
         for entry in entries:
             label = f"{entry['gear_set']}/{entry['name']}" if "gear_set" in entry else entry["name"]
-            console.out.print(f"  {label:40s} {entry['doc']}", highlight=False, soft_wrap=True)
+            console.out.print(f"  {label:40s} {entry['doc']}")
             for key, p in entry["parameters"].items() if kind is Kind.FORMS else ():
                 told = f"{p['lo']:g} .. {p['hi']:g} {p['unit']}"
-                console.out.print(f"    {key:38s} {told:22s} {p['doc']}", highlight=False, soft_wrap=True)
+                console.out.print(f"    {key:38s} {told:22s} {p['doc']}")
 
 
 def _entries(kind: Kind) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from ivl.cli import console
 from ivl.errors import ConfigError, LinkError
@@ -58,7 +59,7 @@ def mocap(
         console.print_json({**state.to_json(), "problems": problems})
     else:
         for problem in problems:
-            console.err.print(problem, style="red", highlight=False, markup=False, soft_wrap=True)
+            console.err.print(problem, style="red")
     return 1 if problems else 0
 
 
@@ -99,12 +100,12 @@ def _watch(tracking: Mocap, seconds: float | None, quiet: bool) -> None:
 
 
 def _table(config: MocapConfig, state: MocapState) -> Table:
-    table = Table(show_header=False, box=None, highlight=False)
+    table = Table(show_header=False, box=None)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     rates, counts, number = state.rates, state.counts, console.number
     table.add_row("system", f"{config.system} {config.host}".rstrip())
-    table.add_row("status", f"[{_COLOURS.get(state.status, 'red')}]{state.status}[/]  {state.text}")
+    table.add_row("status", Text.assemble((state.status, _COLOURS.get(state.status, "red")), f"  {state.text}"))
     table.add_row("position", _vector(state.pose.p_W_m if state.pose else None, "m", 3))
     table.add_row("roll, pitch, yaw", _vector(_euler_deg(state), "deg, nose down positive", 1))
     table.add_row("age", f"{number(1e3 * state.age_s, 0)} ms")

@@ -56,8 +56,6 @@ def report(
             f"{made.n_different} of {made.n_landings} landings differ from what the run recorded: "
             "it was flown by another version of the simulator",
             style="yellow",
-            highlight=False,
-            soft_wrap=True,
         )
     if as_json:
         console.print_json(
@@ -71,8 +69,6 @@ def report(
     else:
         console.out.print(
             f"{made.path}: {made.size_bytes / 1e6:.1f} MB, {made.n_landings} landings to replay",
-            highlight=False,
-            soft_wrap=True,
         )
     if open_ and not webbrowser.open(made.path.resolve().as_uri()):
         raise IvlError(f"{made.path}: no web browser was found to open it with")

@@ -62,7 +62,7 @@ def rollout(
         else {"form": name, "theta": policy_options.theta_of(name, theta, rrev, moment)}
     )
     numbers = {"seed": seed, "stream": stream, "d_ceil_m": distance}
-    data = chosen.fields(learned.tasks[0] if learned is not None else None)
+    data = chosen.fields(*(learned.tasks if learned is not None else ()))
     for name in ("speed_mps", "angle_deg"):
         if name not in data:
             raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")
@@ -99,4 +99,4 @@ def _result(world: World, flight: Trace) -> dict[str, Any]:
 def _report(result: dict[str, Any]) -> None:
     for name, value in result.items():
         text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
-        console.out.print(f"{name:24s} {text}", highlight=False, soft_wrap=True)
+        console.out.print(f"{name:24s} {text}")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ivl import files
 from ivl.cli import console, policy_options
 from ivl.cli.task_options import EQUIPMENT, Chosen, task_options
 from ivl.silproc import model_text, server_path
@@ -60,10 +61,10 @@ def sil(
 ) -> None:
     """Start the software vehicle; HELP is the text that people see."""
     learned = policy_options.load(policy_file)
-    world = chosen.make_world(learned.tasks[0] if learned is not None else None)
+    world = chosen.make_world(*(learned.tasks if learned is not None else ()))
     text = model_text(world)
     if write_model is not None:
-        write_model.write_text(text, encoding="ascii")
+        files.write(write_model, text)
         return
     command = [str(server_path()), "--model", "-", "--port", str(port), "--bind", bind]
     command += ["--vehicles", str(vehicles), "--speed", speed, "--packets", str(packets), "--seed", str(seed)]
@@ -73,13 +74,10 @@ def sil(
         command += ["--fault", item]
     for name in deck or []:
         command += ["--deck", name]
-    console.err.print(
-        f"{world.vehicle} with gear {world.gear} of {world.gear_set}; Ctrl-C stops", highlight=False, soft_wrap=True
-    )
+    console.err.print(f"{world.vehicle} with gear {world.gear} of {world.gear_set}; Ctrl-C stops")
     if world.params.values["aero.yaw_torque"] == 0.0:
         console.err.print(
             f"{world.vehicle} cannot turn: its aero.yaw_torque is 0, so that yaw commands change nothing",
-            soft_wrap=True,
         )
     _become(command, text)
 

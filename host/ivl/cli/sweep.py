@@ -1,6 +1,7 @@
 """`ivl sweep` and `ivl map`."""
 
 import math
+import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn
 
-from ivl import run
+from ivl import references, run
 from ivl.cli import console, policy_options
 from ivl.family import MEMBER
 from ivl.policy import use
@@ -108,9 +109,11 @@ def sweep(
     from ivl.sweep import config  # with Arrow and Dask it takes a second to load
 
     learned = policy_options.load(policy_file)
-    change = use.as_it_is(learned, learner) if learned is not None else None
+    change = use.as_it_is(learned, learner, vary or []) if learned is not None else None
     grid = config.load_sweep(path, settings or [], [*(vary or []), *_members(family)], change, learner=learner)
-    base = f"{grid.name}-{grid.gear_set}-{'-'.join(grid.learner_names())}"
+    if learned is not None:
+        use.check_as_it_is(grid, learned, learner)
+    base = f"{grid.name}-{references.title(grid.gear_set)}-{'-'.join(grid.learner_names())}"
     return _run(grid, base, "ivl sweep", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 
 
@@ -131,7 +134,7 @@ def map_(
     from ivl.sweep import config
 
     grid = config.load_map(path, settings or [], [*(vary or []), *_members(family)])
-    base = f"{grid.name}-{grid.gear_set}"
+    base = f"{grid.name}-{references.title(grid.gear_set)}"
     return _run(grid, base, "ivl map", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 
 
@@ -148,7 +151,7 @@ def _run(
     from ivl.sweep import cluster, engine, plan, summary
 
     if dry_run:
-        size = task_size or plan.good_size(grid, workers or cluster.processors())
+        size = task_size or plan.good_size(grid, workers or cluster.default_workers())
         _print(summary.of_plan(grid, size), as_json)
         return 0
     run_folder = out or run.numbered_folder(base, resume)
@@ -159,11 +162,8 @@ def _run(
                 on_standing=on_standing,
             )  # fmt: skip
     except KeyboardInterrupt:
-        console.err.print(
-            f"interrupted; continue with the same options and --resume --out {run_folder} ({command} {path})",
-            highlight=False,
-            soft_wrap=True,
-        )
+        words = shlex.join([*command.split(), path, "--resume", "--out", str(run_folder)])
+        console.say(f"interrupted; continue with: {words} and the same options")
         raise
     report = summary.of_run(result)
     _print(report, as_json)
@@ -186,7 +186,7 @@ def _progress(run_folder: Path) -> Iterator[Callable[[Any], None]]:
 
     def move(standing: Any) -> None:
         if not bar.live.is_started:
-            console.err.print(f"run folder: {run_folder}", highlight=False, soft_wrap=True)
+            console.err.print(f"run folder: {run_folder}")
             bar.start()
         bar.update(row, total=standing.n_trials, completed=standing.n_done, rate=_rate(standing), left=_left(standing))
 
@@ -230,7 +230,7 @@ def _print(report: dict[str, Any], as_json: bool) -> None:
 
 def _print_lines(values: dict[str, Any]) -> None:
     for name, value in values.items():
-        console.out.print(f"{name.replace('_', ' '):34s} {_text(value)}", highlight=False, soft_wrap=True)
+        console.out.print(f"{name.replace('_', ' '):34s} {_text(value)}")
 
 
 def _text(value: Any) -> str:

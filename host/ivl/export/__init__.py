@@ -1,10 +1,10 @@
 """A landing as a file for tools that people use: MCAP (Foxglove, PlotJuggler), Bitcraze's CSV, Rerun's .rrd."""
 
-import shutil
 from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 
+from ivl import files
 from ivl.errors import ConfigError
 from ivl.export.flight import Flight
 
@@ -29,7 +29,7 @@ def write(flight: Flight, path: Path, kind: Format) -> None:
     try:
         _writer(kind)(flight, path)
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error}") from error
+        raise ConfigError(f"{path}: cannot be written: {files.reason(error)}") from error
 
 
 def copy_layouts(folder: Path) -> list[Path]:
@@ -39,9 +39,11 @@ def copy_layouts(folder: Path) -> list[Path]:
         ConfigError: A file cannot be written.
     """
     try:
-        return [Path(shutil.copy(path, folder / path.name)) for path in sorted(LAYOUTS_DIR.iterdir())]
+        for path in sorted(LAYOUTS_DIR.iterdir()):
+            files.write(folder / path.name, path.read_bytes())
+        return [folder / path.name for path in sorted(LAYOUTS_DIR.iterdir())]
     except OSError as error:
-        raise ConfigError(f"{folder}: the layouts cannot be written: {error}") from error
+        raise ConfigError(f"{folder}: the layouts cannot be written: {files.reason(error)}") from error
 
 
 def _writer(kind: Format) -> Callable[[Flight, Path], None]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from ivl import files
 from ivl.export.flight import Flight, FloatArray
 
 _G_MPS2 = 9.80665
@@ -19,7 +20,7 @@ def write(flight: Flight, path: Path) -> None:
     table = columns(flight)
     lines = [",".join(table)]
     lines += [",".join(f"{value:.9g}" for value in row) for row in zip(*table.values(), strict=True)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    files.write(path, "\n".join(lines) + "\n")
 
 
 def columns(flight: Flight) -> dict[str, npt.NDArray[np.float64]]:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl import outcome, tracefile
-from ivl.errors import ConfigError
+from ivl.flight import table as border
 from ivl.landing import LandingSpec
 from ivl.rewards import RewardChoice
 from ivl.world import World, rotation
@@ -103,34 +103,30 @@ def of_file(path: Path, world: World) -> Flight:
         ConfigError: The file is neither.
     """
     tracefile.check_suffix(path)
-    table = tracefile.read_columns(path)
-    if "p_x_W_m" in table:
+    table = tracefile.read_table(path)
+    if "p_x_W_m" in table.columns:
         return _of_recorder(table, path, world)
-    return _of_rows(tracefile.read(path), world, path.name, {"file": path.name})
+    return _of_rows(tracefile.rows_of(table), world, path.name, {"file": path.name})
 
 
 def _of_rows(rows: Any, world: World, title: str, facts: dict[str, str]) -> Flight:
     return Flight(title, tracefile.columns(rows), [world.phase_name(int(code)) for code in rows["phase"]], world, facts)
 
 
-def _of_recorder(table: dict[str, FloatArray], path: Path, world: World) -> Flight:
+def _of_recorder(table: border.Table, path: Path, world: World) -> Flight:
     """Recorder rows under the trace's names; the cues follow from distance and velocity as the core computes them."""
-    columns: dict[str, npt.NDArray[Any]] = {"t_s": _column(table, "t_s", path)}
+    sources_all = ("t_s", *(source for sources in _RECORDER.values() for source in sources))
+    table.need(sources_all, "the table of a flight recorder")
+    columns: dict[str, npt.NDArray[Any]] = {"t_s": border.clock(table, "t_s", 1.0)}
     for name, sources in _RECORDER.items():
         for i, source in enumerate(sources):
-            columns[name if len(sources) == 1 else f"{name}_{i + 1}"] = _column(table, source, path)
+            columns[name if len(sources) == 1 else f"{name}_{i + 1}"] = table.numbers(source, needed=True)
     d_m = np.where(columns["d_sensed_m"] > 0, columns["d_sensed_m"], np.nan)
     columns["rrev_per_s"] = columns["v_WB_mps_3"] / d_m
     columns["of_y_radps"] = -columns["v_WB_mps_1"] / d_m
     columns["pitch_deg"] = _nose_up_deg(np.column_stack([columns[f"q_WB_{i}"] for i in (1, 2, 3, 4)]))
     phase = [world.phase_name(int(code)) for code in columns["phase"]]
     return Flight(path.name, columns, phase, world, {"file": path.name, "source": "flight recorder"})
-
-
-def _column(table: dict[str, FloatArray], name: str, path: Path) -> FloatArray:
-    if name not in table:
-        raise ConfigError(f"{path}: column {name} is missing: this is no table of a flight recorder")
-    return table[name]
 
 
 def _nose_up_deg(q: FloatArray) -> FloatArray:

@@ -5,7 +5,8 @@
     /ivl/scene   foxglove.SceneUpdate      ceiling (again in each row if it moves) and body once, legs in each row
     /ivl/state   ivl.State                 every column of the trace by name, and the phase in words
 
-Time begins at 0 with the landing. Messages are JSON, so that no other library is needed to read them.
+Time begins at 0 with the landing; of a file with times below 0, with its first row. Messages are JSON, so that no
+other library is needed to read them.
 """
 
 import json
@@ -16,6 +17,7 @@ from pathlib import Path
 from mcap.writer import Writer
 
 import ivl
+from ivl import files
 from ivl.export import scene, schemas
 from ivl.export.flight import Flight
 
@@ -29,7 +31,7 @@ TOPICS = {
 
 def write(flight: Flight, path: Path) -> None:
     """Write a flight; raises OSError if the file cannot be written."""
-    with path.open("wb") as file:
+    with files.replacing(path) as part, part.open("wb") as file:
         writer = Writer(file)
         writer.start(profile="", library=f"ivl {ivl.__version__}")
         channels = {}
@@ -45,7 +47,7 @@ def write(flight: Flight, path: Path) -> None:
 
 def messages(flight: Flight) -> Iterator[tuple[int, str, scene.Message]]:
     """(time in ns, topic, message) in the order of time."""
-    times_ns = [round(1e9 * t) for t in flight.t_s]
+    times_ns = [round(1e9 * (t - min(flight.t_s[0], 0.0))) for t in flight.t_s]  # MCAP has no time before 0
     position, attitude = flight.vector("p_WB_m", 3), flight.vector("q_WB", 4)
     feet, names = flight.feet_W_m, list(flight.columns)
     hips, radius_m = flight.hips_W_m(), flight.world.params.values["leg.foot_radius"]

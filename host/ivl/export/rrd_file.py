@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ivl import files
 from ivl.errors import IvlError
 from ivl.export import scene
 from ivl.export.flight import Flight
@@ -27,11 +30,19 @@ def write(flight: Flight, path: Path) -> None:
         IvlError: Rerun is not installed.
     """
     try:
-        import rerun as rr
+        import rerun  # noqa: F401
     except ModuleNotFoundError as error:
         raise IvlError("rerun is not installed: pip install 'ivl[rerun]'") from error
-    recording = rr.RecordingStream("ivl", recording_id=flight.title)
+    with files.replacing(path) as part:
+        _record(flight, part)
+
+
+def _record(flight: Flight, path: Path) -> None:
+    import rerun as rr
+
+    recording = rr.RecordingStream("ivl", recording_id=_identity(flight))
     recording.save(path, default_blueprint=_blueprint(flight))
+    recording.send_recording_name(flight.title)
     values = flight.world.params.values
     plates = ("base_plate", "prop_plate")
     recording.log(
@@ -57,6 +68,15 @@ def write(flight: Flight, path: Path) -> None:
     _log_legs(flight, recording)
     recording.flush()
     recording.disconnect()
+
+
+def _identity(flight: Flight) -> str:
+    """Equal for the same landing alone, so that tools which merge recordings keep different ones apart."""
+    said = hashlib.sha256(json.dumps([flight.title, sorted(flight.facts.items())]).encode())
+    for name in sorted(flight.columns):
+        said.update(name.encode())
+        said.update(np.ascontiguousarray(flight.columns[name]).tobytes())
+    return said.hexdigest()[:32]
 
 
 def _series(flight: Flight) -> list[str]:

@@ -72,7 +72,7 @@ def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str, RewardCho
     trial = choice.trial or 0
     if trial >= (n_trials or 1):
         raise ConfigError(f"--trial {trial}: {folder} has trials 0 .. {(n_trials or 1) - 1}")
-    with RunStore.open_existing(folder, native.library().outcome_dtype) as store:
+    with RunStore.open_reading(folder, native.library().outcome_dtype) as store:
         rollouts = store.rollouts(trial=trial)
     scored = np.flatnonzero(rollouts.status == SCORED)
     if not scored.size:

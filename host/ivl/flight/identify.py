@@ -19,11 +19,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import yaml
 from scipy import stats  # type: ignore[import-untyped]
 from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
-from ivl import model, native
+from ivl import model, native, yamlfile
 from ivl.errors import ConfigError
 from ivl.flight import compare, motion
 from ivl.flight.motion import Flip
@@ -549,7 +548,7 @@ def vehicle_text(vehicle: str, values: Mapping[str, float], sigmas: Mapping[str,
         if name in values:
             told |= {"value": values[name], "sigma": sigmas[name], "source": "set aside, to be identified"}
         groups.setdefault(group, {})[key] = told
-    return yaml.safe_dump({"name": f"{part.name}_off", "doc": part.doc, **groups}, sort_keys=False)
+    return yamlfile.dump({"name": f"{part.name}_off", "doc": part.doc, **groups})
 
 
 def replace_quantity(quantity: model.Quantity, estimate: Estimate | None, source: str) -> dict[str, Any]:

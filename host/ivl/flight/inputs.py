@@ -38,7 +38,7 @@ class Ticks:
         seen: For each sample the number of the tick that sees it first.
         fed: False for a sample that a later one replaced before a tick came.
         begins: Sample at which the approach begins; the number of samples if there is none.
-        begun_by: What told so: "phase", "set-point", "closing speed", or "nothing".
+        begun_by: What says so: "phase", "set-point", "closing speed", or "nothing".
         policy: Number of the form, and parameters in SI units, as committed.
         config: Configuration of the core, one record.
         notes: What was not in the log, one phrase each.

@@ -196,7 +196,7 @@ class CrazyflieSource:
             raise RolloutError(f"{self.uri}: not fit to fly: {'; '.join(filter(None, problems))}")
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         vehicle.configure(self.world)
-        if not again:  # on the ground: a vehicle with other forms is told from ours before it takes off
+        if not again:  # on the ground: a vehicle with other forms is found out before it takes off
             vehicle.put_policy(self._experiment.policy.shape, self._experiment.policy.mu0)
         if self._tracking is not None:
             self._tracking.watch_over(vehicle)

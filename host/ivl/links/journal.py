@@ -1,12 +1,14 @@
 """What a run folder keeps of the flights of a vehicle: a journal of all, and the recordings of those that count."""
 
 import json
+import os
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ivl import files
 from ivl.forms import Form
 from ivl.links.landing_flight import Landing, Rollout
 
@@ -34,6 +36,8 @@ class Journal:
             line |= {"battery_V": battery_V, "n_legs": int(landing.outcome["n_legs"][0])}
         with (self._folder / JOURNAL).open("a", encoding="utf-8") as file:
             file.write(json.dumps(line, allow_nan=False) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
 
     def keep_recording(self, landing: Landing) -> None:
         """A file named by seed and stream, if there is a recording."""
@@ -42,4 +46,4 @@ class Journal:
         folder = self._folder / RECORDINGS
         folder.mkdir(exist_ok=True)
         name = f"{landing.rollout.seed:016x}-{landing.rollout.stream}.csv"
-        (folder / name).write_text(landing.recording.to_csv(), encoding="utf-8")
+        files.write(folder / name, landing.recording.to_csv())

@@ -16,6 +16,7 @@ from ivl.errors import ConfigError, LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links.packets import Phase, Recording, Request
 from ivl.links.vehicle import Command, Snapshot, Vehicle
+from ivl.surface import Surface
 from ivl.world import World
 
 if TYPE_CHECKING:
@@ -113,52 +114,50 @@ def check_abort(vehicle: Vehicle) -> None:
     """
     if vehicle.aborted_by and vehicle.abort_reason:
         raise RolloutError(f"aborted: {vehicle.abort_reason}")
+    if vehicle.spoiled_by:
+        raise RolloutError(f"not to be scored: {vehicle.spoiled_by}")
     if native.library().rules().get(vehicle.aborted_by, False):
         raise RolloutError(f"the vehicle aborted: {vehicle.aborted_by}")
 
 
 @dataclass(frozen=True)
 class LevelOut:
-    """How an approach ended that the policy called off.
+    """A level-out as the vehicle's logs tell of it.
 
     Attributes:
-        p_land: Probability of a landing by which it was decided.
-        d_decided_m: Distance that was sensed then.
-        highest_m: Highest point, in W, that the vehicle's logs tell of the time since.
+        decision: Probability of a landing and sensed distance (m) by which the approach was called off.
+        nearest_m: Least distance from the surface, m.
     """
 
-    p_land: float
-    d_decided_m: float
-    highest_m: float
+    decision: tuple[float, float]
+    nearest_m: float
 
 
-def end_level_out(vehicle: Vehicle) -> LevelOut | None:
+def end_level_out(vehicle: Vehicle, surface: Surface) -> LevelOut:
     """After a no-go: wait until the vehicle hovers by itself, ask it to HOVER, and let it land where it is.
 
-    Returns:
-        None if the vehicle aborted instead, which is then in `vehicle.aborted_by`.
+    If it aborts instead, which is then in `vehicle.aborted_by`, it is left to that.
 
     Raises:
         RolloutError: It did not come to rest.
         LinkError: The link is gone.
     """
-    highest_m, still, last = vehicle.position_W_m[2], 0, vehicle.position_W_m
+    nearest_m, still, last = math.inf, 0, vehicle.position_W_m
 
     def hovers() -> bool:
-        nonlocal highest_m, still, last
+        nonlocal nearest_m, still, last
         here = vehicle.position_W_m
-        highest_m = max(highest_m, here[2])
+        nearest_m = min(nearest_m, float(surface.gap_m(here)))
         still = still + 1 if math.dist(here, last) < _STILL_M else 0
         last = here
         return still >= 2 or vehicle.phase != Phase.LEVEL_OUT
 
     vehicle.wait(hovers, _LEVEL_OUT_S, "hover after a no-go", _LOOK_S)
-    if vehicle.phase != Phase.LEVEL_OUT:
-        return None
-    p_land, d_decided_m = vehicle.decision()
-    vehicle.ask_for(Command(Request.HOVER, vehicle.position_W_m), (Phase.READY,), _READY_S)
-    vehicle.come_down()
-    return LevelOut(p_land, d_decided_m, highest_m)
+    told = LevelOut(vehicle.decision(), nearest_m)  # a new hover forgets the decision
+    if vehicle.phase == Phase.LEVEL_OUT:
+        vehicle.ask_for(Command(Request.HOVER, vehicle.position_W_m), (Phase.READY,), _READY_S)
+        vehicle.come_down()
+    return told
 
 
 def start_point(world: World, experiment: Experiment) -> Point:

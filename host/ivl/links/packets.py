@@ -154,8 +154,8 @@ class Recording:
     """A downloaded flight recorder.
 
     Attributes:
-        n_cycle: Arm cycle that it belongs to; changes with each recording.
-        policy_seq: Number of the policy that triggered, 0 if none did.
+        n_cycle: Its number since the start of the vehicle.
+        policy_seq: Number of the policy that triggered or was called off, 0 if neither happened.
         policy_crc: Its checksum.
         trigger_row: Row of the trigger tick, None if the trigger did not fire.
         tick_hz: Rows per second.
@@ -218,12 +218,14 @@ def record_rows(header: Mapping[str, int | float], data: bytes) -> Recording:
         if name != "t_us":
             rows[_ROW_NAMES.get(name, name)] = raw[name] / field.default if name in _ROW_NAMES else raw[name]
     rows["thrust_N"] *= header["thrust_N_max"]
-    trigger_row = int(header["trigger_row"])
+    begin_row = int(header["trigger_row"])
+    # a recording may also begin with a level-out
+    is_trigger = begin_row != RECORD_NO_ROW and rows["phase"][begin_row] != Phase.LEVEL_OUT
     return Recording(
         int(header["n_cycle"]),
         int(header["policy_seq"]),
         int(header["policy_crc"]),
-        None if trigger_row == RECORD_NO_ROW else trigger_row,
+        begin_row if is_trigger else None,
         float(header["tick_hz"]),
         rows,
     )

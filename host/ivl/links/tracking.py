@@ -38,8 +38,10 @@ class Tracking:
             raise
 
     def watch_over(self, vehicle: Vehicle) -> None:
-        """From now on a loss before the trigger aborts the flight."""
-        self.mocap.guard = LossGuard(lambda: int(vehicle.phase), vehicle.abort)
+        """From now on a loss before the trigger aborts the flight, and keeps it from being scored."""
+        self.mocap.guard = LossGuard(
+            lambda: int(vehicle.phase), vehicle.abort, flies=lambda: vehicle.seems_to_fly, spoil=vehicle.spoil
+        )
 
     def problems(self) -> list[str]:
         """What speaks against a flight now, one line each."""

@@ -8,7 +8,6 @@ from typing import Any, Self
 import numpy as np
 
 from ivl import native
-from ivl.links.landing_flight import LevelOut
 from ivl.links.packets import Phase, Recording
 from ivl.links.vehicle import Snapshot
 from ivl.world import World, rotation
@@ -79,11 +78,20 @@ def outcome_of_flight(
     return outcome
 
 
-def note_no_go(outcome: np.ndarray[Any, np.dtype[np.void]], called_off: LevelOut, world: World) -> None:
-    """Write into an outcome of shape (1,) that its approach was called off; the recorder has only the end of it."""
-    outcome["no_go"], outcome["end_reason"] = 1, _end_code("no_go")
-    gap_m = world.params.values["world.ceiling_height"] - called_off.highest_m
-    outcome["d_min_m"] = np.fmin(outcome["d_min_m"], gap_m)
+def note_no_go(outcome: np.ndarray[Any, np.dtype[np.void]], nearest_m: float, aborted: bool) -> None:
+    """Write into an outcome of shape (1,) that its approach was called off.
+
+    The recorder has the highest point of a level-out that is short enough; the vehicle's logs have that of any.
+
+    Args:
+        outcome: What recorder and operator tell.
+        nearest_m: Least distance from the surface in the level-out, inf if nobody has looked.
+        aborted: Whether the level-out ended in an abort; as in the simulator, such a flight does not end as a no-go.
+    """
+    outcome["no_go"] = 1
+    if not aborted:
+        outcome["end_reason"] = _end_code("no_go")
+    outcome["d_min_m"] = np.fmin(outcome["d_min_m"], nearest_m)
 
 
 def pitch_deg(q_WB: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:

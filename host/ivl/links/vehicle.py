@@ -146,6 +146,8 @@ class Vehicle:
         """Why `abort` was called; empty if it was not."""
         self.aborted_by = ""
         """Safety rule by which the vehicle aborted ("none": it was asked to); empty if it has not."""
+        self.spoiled_by = ""
+        """Why this flight must not be scored, however it ends; empty if there is no reason."""
         self._seq = secrets.randbits(16)
         self._policy_seq = secrets.randbits(31)
         self._offer: Offer | None = None
@@ -161,12 +163,13 @@ class Vehicle:
         self.trigger = LogBlock(
             ("ivl.trg_seq", "ivl.trg_d", "ivl.trg_rrev", "ivl.trg_of_y", "ivl.trg_vx", "ivl.trg_vz"), 50
         )
-        self._decision = LogBlock(("ivl.decided", "ivl.p_decided", "ivl.d_decided"), 50)
+        self._decision = LogBlock(("ivl.decided", "ivl.p_decided", "ivl.d_decided", "ivl.n_no_go"), 50)
+        self._n_no_go = 0
         self.config = LogBlock(("ivl.cfg_seq", "ivl.cfg_status", "ivl.cfg_bad", "ivl.cfg_crc"), 100)
         session.listen(_PORT_PLATFORM, _APP, self._on_app)
         for block in (self.watch, self.state, self.trigger, self._decision, self.config):
             session.start_log(block)
-        if not self.wait_in_wall_time(lambda: bool(self.watch.values), _LOGS_S):
+        if not self.wait_in_wall_time(lambda: bool(self.watch.values and self._decision.values), _LOGS_S):
             raise LinkError(f"{session.uri}: no log variables came within {_LOGS_S:g} s")
 
     def _on_app(self, data: bytes) -> None:
@@ -244,8 +247,9 @@ class Vehicle:
         self.session.send(_PORT_PLATFORM, _APP, encode_reading(rrev_per_s, of_y_radps, age_s))
 
     def begin_flight(self) -> None:
-        """Forget how the last flight was aborted, and a policy that was never confirmed."""
-        self.abort_reason = self.aborted_by = ""
+        """Forget how the last flight was aborted, or called off, and a policy that was never confirmed."""
+        self.abort_reason = self.aborted_by = self.spoiled_by = ""
+        self._n_no_go = int(self._decision.values.get("ivl.n_no_go", 0))
         self._offer = None
 
     def abort(self, reason: str) -> None:
@@ -253,6 +257,10 @@ class Vehicle:
         self.abort_reason = reason
         self.command = replace(self.command, request=Request.ABORT)
         self.send_command()
+
+    def spoil(self, reason: str) -> None:
+        """This flight must not be scored; the first reason is kept. From any thread."""
+        self.spoiled_by = self.spoiled_by or reason
 
     def come_down(self) -> None:
         """Land where it hovers after a flight that is over: its landing is that of an abort, but it is none.
@@ -418,6 +426,11 @@ class Vehicle:
         answer = self.session.ask(_PORT_SUPERVISOR, 0, b"\x0c", b"\x8c", "state of the supervisor")
         return Supervisor(int.from_bytes(answer[1:3], "little") & 0xFF)
 
+    @property
+    def seems_to_fly(self) -> bool:
+        """The same as `is_flying`, as the vehicle's log told last, without asking."""
+        return Supervisor.FLYING in Supervisor(int(self.watch.values.get("supervisor.info", 0)) & 0xFF)
+
     def is_flying(self) -> bool:
         """Whether the supervisor believes that it flies."""
         return Supervisor.FLYING in self.supervisor()
@@ -488,6 +501,10 @@ class Vehicle:
         if not values.get("ivl.decided", 0):
             return float("nan"), float("nan")
         return float(values["ivl.p_decided"]), float(values["ivl.d_decided"])
+
+    def was_called_off(self) -> bool:
+        """Whether its policy has called off an approach of this flight, whatever has become of the level-out since."""
+        return int(self._decision.values.get("ivl.n_no_go", 0)) != self._n_no_go
 
     def recording(self, policy_seq: int) -> Recording:
         """Download the flight recorder of the landing that flew a policy (errors as `recorder.download`)."""

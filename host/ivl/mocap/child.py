@@ -12,12 +12,15 @@ action ends it, since a client that blocks holds Python's lock. It imports nothi
 
 import json
 import os
+import resource
 import signal
 import sys
 import threading
 import time
 from collections.abc import Mapping
 from typing import Any
+
+_MEMORY_BYTES = 1 << 30
 
 
 def read_bodies(bodies: Mapping[str, Any]) -> dict[str, list[float]]:
@@ -59,6 +62,8 @@ class Emit:
 
 def main() -> None:
     """Run until the parent is gone."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_DATA, (_MEMORY_BYTES, _MEMORY_BYTES))  # a hostile count of bodies ends it early
     request = json.loads(sys.stdin.readline())
     # clients print on stdout: what they print goes to stderr, and frames to a copy that only we know
     emit = Emit(os.dup(1))

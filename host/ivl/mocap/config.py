@@ -39,6 +39,8 @@ class MocapConfig(BaseModel):
     settle_s: Number = Field(default=0.2, gt=0, le=5, description="poses agree for so long after a loss: good again")
     speed_mps_max: Number = Field(default=10.0, ge=0.5, le=50, description="faster is a jump")
     rate_radps_max: Number = Field(default=60.0, ge=1, le=200, description="faster is a jump")
+    accel_mps2_max: Number = Field(default=20.0, ge=1, le=200, description="what motors and gravity can do, at most")
+    angular_accel_radps2_max: Number = Field(default=500.0, ge=10, le=5000, description="what motors can do, at most")
 
     position_sigma_m: Number = Field(default=0.01, ge=1e-4, le=1, description="told to the vehicle's estimator")
     attitude_sigma_rad: Number = Field(default=0.03, ge=1e-4, le=1, description="told to the vehicle's estimator")

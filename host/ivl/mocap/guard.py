@@ -8,6 +8,7 @@ from ivl.links.packets import Phase
 from ivl.mocap.watch import Status
 
 BEFORE_TRIGGER = frozenset((Phase.READY, Phase.APPROACH, Phase.LEVEL_OUT))
+WITHOUT_CORE = frozenset((Phase.IDLE, Phase.DONE))
 IN_FLIP = frozenset((Phase.FLIP, Phase.COAST, Phase.ATTACHED))
 AGAIN_S = 0.05
 
@@ -19,19 +20,42 @@ class Guard(Protocol):
         """Look, and return at once."""
         ...
 
+    def in_flight(self) -> bool:
+        """Whether the vehicle flies, as far as is known."""
+        ...
+
+
+def _nowhere() -> bool:
+    return False
+
+
+def _ignore(reason: str) -> None:
+    del reason
+
 
 class LossGuard:
-    """Before the trigger a loss asks for an abort, again and again while it lasts; later nothing is interrupted."""
+    """Before the trigger a loss spoils the flight, and asks for an abort, again and again while it lasts.
 
-    def __init__(self, phase: Callable[[], int], abort: Callable[[str], None]) -> None:
+    Later nothing is interrupted.
+    """
+
+    def __init__(
+        self,
+        phase: Callable[[], int],
+        abort: Callable[[str], None],
+        flies: Callable[[], bool] = _nowhere,
+        spoil: Callable[[str], None] = _ignore,
+    ) -> None:
         """Watch over a flight.
 
         Args:
             phase: The flight core's phase as last heard.
             abort: Asks the vehicle to abort, with the reason; called in the thread of motion capture. Repeating it must
                 change nothing, as with the request ABORT, which the flight core obeys before the trigger only.
+            flies: Whether its motors carry the vehicle, whoever controls it.
+            spoil: Told the reason why this flight must not be scored, whether or not an abort comes in time.
         """
-        self._phase, self._abort = phase, abort
+        self._phase, self._abort, self._flies, self._spoil = phase, abort, flies, spoil
         self._t_next_s = float("-inf")
         self._is_lost = False
         self._has_asked = False
@@ -48,10 +72,16 @@ class LossGuard:
         if reason:
             raise RolloutError(f"aborted: {reason}")
 
+    def in_flight(self) -> bool:
+        """Under the flight core, or under another controller."""
+        return self._phase() in BEFORE_TRIGGER | IN_FLIP or self._flies()
+
     def look(self, status: Status, text: str, now_s: float) -> None:
         """Ask for an abort if it is time to."""
         was_lost, self._is_lost = self._is_lost, status is not Status.GOOD
         phase = self._phase()
+        if self._is_lost and (phase in BEFORE_TRIGGER or (phase in WITHOUT_CORE and self._flies())):
+            self._spoil(text)
         if not self._is_lost:
             self._has_asked = False
         elif phase in BEFORE_TRIGGER and now_s >= self._t_next_s:

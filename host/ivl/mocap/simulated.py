@@ -1,10 +1,14 @@
-"""The software vehicle in a room with cameras: its true pose, from its own log, through a small OptiTrack server.
+"""Software vehicles in a room with cameras: their true poses, from their own logs, through a small OptiTrack server.
 
-The host then tracks it as it would track a vehicle: the same client in the same child process, the same checks, and the
-external poses fly it (parameter sil.pose_source = 1). For real time; in lock-step time is not that of cameras.
+The host then tracks one as it would track a vehicle: the same client in the same child process, the same checks, and
+the external poses fly it (parameter sil.pose_source = 1). Several vehicles are as many rigid bodies in each frame. For
+real time; in lock-step time is not that of cameras.
+
+    room = SimulatedRoom(session_1, "cf1")
+    room.track(session_2, "cf2")
+    first, second = (Mocap(config, s.cf.extpos, room.request(config)) for s, config in ...)
 """
 
-import contextlib
 import struct
 import threading
 from typing import Any, Protocol, Self
@@ -50,10 +54,10 @@ class Link(Protocol):
 
 
 class SimulatedRoom:
-    """Cameras around a software vehicle. Faults are attributes that can be set at any time."""
+    """Cameras around software vehicles. Faults are attributes that can be set at any time."""
 
     def __init__(self, link: Link, body: str, noise_m: float = 1e-4, seed: int = 0) -> None:
-        """Begin to track.
+        """Begin to track a vehicle.
 
         Args:
             link: Open session with a software vehicle.
@@ -64,31 +68,56 @@ class SimulatedRoom:
         Raises:
             LinkError: The vehicle tells no true pose; it is no software vehicle.
         """
-        if not link.has_log(_POSITION[0]):
-            raise LinkError(f"{link.uri}: system simulator: the vehicle has no log variable {_POSITION[0]}")
-        self.server = NatNetServer([body])
         self.frozen = False
         """The cameras repeat their last frame."""
         self.occluded = False
-        """They do not see the body."""
+        """They see no body."""
         self.silent = False
         """They send nothing."""
         self.shift_m = (0.0, 0.0, 0.0)
-        """They take something else for the body, so far away."""
-        self._body, self._noise_m, self._rng = body, noise_m, np.random.default_rng(seed)
-        self._last: list[float] | None = None
-        self._closing = threading.Event()
-        link.listen(_PORT_LOG, _DATA, self._on_data)
+        """They take something else for each body, so far away."""
+        self.swapped: tuple[str, str] | None = None
+        """They take these two bodies for each other."""
+        self._noise_m, self._rng = noise_m, np.random.default_rng(seed)
+        self._lock = threading.Lock()
+        self._closed = False
+        self._servers: list[NatNetServer] = []
+        self._frame: dict[str, list[float] | None] = {}
+        self._last: dict[str, list[float]] = {}
+        self.track(link, body)
+
+    def track(self, link: Link, body: str) -> None:
+        """Follow a further vehicle; before `request`, since cameras say which bodies they know when they are asked.
+
+        Args:
+            link: Open session with that vehicle.
+            body: Name of its rigid body.
+
+        Raises:
+            LinkError: It is no software vehicle, or the name is another vehicle's.
+        """
+        if not link.has_log(_POSITION[0]):
+            raise LinkError(f"{link.uri}: system simulator: the vehicle has no log variable {_POSITION[0]}")
+        if body in self._frame:
+            raise LinkError(f"{link.uri}: system simulator: body {body} is another vehicle")
+        with self._lock:
+            self._frame[body] = None
+        link.listen(_PORT_LOG, _DATA, lambda data: self._on_data(body, data))
         self._start_log(link)
 
     def request(self, config: MocapConfig) -> dict[str, Any]:
-        """What the process of a `Mocap` is told, to connect to these cameras."""
-        return {"system": "optitrack", "options": self.server.options, "connect_s": config.connect_s}
+        """What the process of a `Mocap` is told, to connect to these cameras; one call for each."""
+        server = NatNetServer(tuple(self._frame))
+        with self._lock:
+            self._servers.append(server)
+        return {"system": "optitrack", "options": server.options, "connect_s": config.connect_s}
 
     def close(self) -> None:
         """Switch the cameras off."""
-        self._closing.set()
-        self.server.close()
+        with self._lock:
+            self._closed = True
+        for server in self._servers:
+            server.close()
 
     def __enter__(self) -> Self:
         """The room itself."""
@@ -106,14 +135,36 @@ class SimulatedRoom:
         for data in (create, bytes((_START, _BLOCK, _PERIOD_10MS))):
             link.ask(_PORT_LOG, _CONTROL, data, data[:2], "log block of the true pose")
 
-    def _on_data(self, data: bytes) -> None:
-        """In the link's thread: a row of the true pose."""
-        if len(data) != _HEAD + _LAYOUT.size or data[0] != _BLOCK or self.silent or self._closing.is_set():
+    def _on_data(self, body: str, data: bytes) -> None:
+        """In the link's thread: a row of the true pose of one vehicle."""
+        if len(data) != _HEAD + _LAYOUT.size or data[0] != _BLOCK:
             return
-        if self._last is None or not self.frozen:
-            values = _LAYOUT.unpack(data[_HEAD:])
+        with self._lock:
+            if self._closed:
+                return
+            if self._frame[body] is not None:  # it is here again before another has come once
+                self._send()
+            self._frame[body] = self._see(body, _LAYOUT.unpack(data[_HEAD:]))
+            if all(pose is not None for pose in self._frame.values()):
+                self._send()
+
+    def _see(self, body: str, truth: tuple[float, ...]) -> list[float]:
+        """What the cameras make of a body's pose."""
+        if body not in self._last or not self.frozen:
             noise = self._rng.normal(0.0, self._noise_m, 3)
-            self._last = [v + float(n) + s for v, n, s in zip(values, noise, self.shift_m, strict=False)]
-            self._last += list(values[3:])
-        with contextlib.suppress(OSError):  # closed in this moment
-            self.server.send({self._body: None if self.occluded else self._last})
+            seen = [v + float(n) + s for v, n, s in zip(truth, noise, self.shift_m, strict=False)]
+            self._last[body] = seen + list(truth[3:])
+        return self._last[body]
+
+    def _send(self) -> None:
+        """One frame with what has come since the last: each pose of each vehicle is in exactly one."""
+        frame, self._frame = self._frame, dict.fromkeys(self._frame)
+        if self.silent:
+            return
+        if self.occluded:
+            frame = dict.fromkeys(frame)
+        if self.swapped is not None:
+            a, b = self.swapped
+            frame[a], frame[b] = frame[b], frame[a]
+        for server in self._servers:
+            server.send(frame)

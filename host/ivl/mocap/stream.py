@@ -101,6 +101,7 @@ class Mocap:
         self._has_connected = False
         self._bodies: tuple[str, ...] = ()
         self._failure = self._sink_error = ""
+        self._is_dead = False
 
     def start(self) -> None:
         """Start the process and the thread."""
@@ -169,25 +170,42 @@ class Mocap:
     # ---- the thread
 
     def _run(self) -> None:
+        """Follow the body; if that fails, for any reason, the body is lost, and the guard is told so to the end."""
+        try:
+            self._follow()
+        except Exception as error:  # noqa: BLE001 - a guard that is silent would let a vehicle fly on
+            with self._lock:
+                self._failure, self._is_dead = f"motion capture itself failed: {type(error).__name__}: {error}", True
+            while not self._ended.wait(TICK_S):
+                if self.guard is not None:
+                    self.guard.look(Status.FAILED, f"motion capture: {self._failure}", time.monotonic())
+
+    def _follow(self) -> None:
         assert self._tracker is not None
         while not self._ended.is_set():
             frames = self._tracker.poll(TICK_S)
+            guard = self.guard
+            in_flight = guard is not None and guard.in_flight()
             with self._lock:
-                believed = [(frame.t_s, pose) for frame in frames if (pose := self._take(frame)) is not None]
+                n_jumps = self._watch.counts.n_jumps
+                believed = [(frame.t_s, pose) for frame in frames if (pose := self._take(frame, in_flight)) is not None]
                 self._failure = self._tracker.failure
                 now_s = time.monotonic()
                 state = self._state(now_s)
+                # also one that was over before anybody looked
+                status = Status.JUMPED if self._watch.counts.n_jumps > n_jumps else state.status
+                text = self._text(status, now_s)
             for t_s, pose in believed:
                 self._send(t_s, pose)
-            if self.guard is not None:
-                self.guard.look(state.status, f"motion capture: {state.text}", now_s)
+            if guard is not None:
+                guard.look(status, f"motion capture: {text}", now_s)
             self._restart_if_silent(now_s, bool(frames))
 
-    def _take(self, frame: Frame) -> Pose | None:
+    def _take(self, frame: Frame, in_flight: bool) -> Pose | None:
         self._bodies = tuple(frame.bodies)
         values = frame.bodies.get(self.config.body)
         pose = None if values is None else make_pose(values, self.config.up)
-        return self._watch.take(frame.t_s, pose, is_present=values is not None)
+        return self._watch.take(frame.t_s, pose, is_present=values is not None, in_flight=in_flight)
 
     def _send(self, t_s: float, pose: Pose) -> None:
         period_s = 1.0 / self.config.send_hz
@@ -217,7 +235,7 @@ class Mocap:
 
     def _state(self, now_s: float) -> MocapState:
         status = self._watch.status(now_s)
-        if self._failure and status is not Status.GOOD:
+        if self._failure and (self._is_dead or status is not Status.GOOD):
             status = Status.FAILED
         return MocapState(
             status,

@@ -21,6 +21,7 @@ from ivl.mocap.config import MocapConfig
 _CHILD = Path(__file__).parent / "child.py"
 _READ_BYTES = 65536
 _END_S = 2.0
+_LINE_BYTES_MAX = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,8 @@ class Tracker:
         self._process.stdin.flush()
         self._rest = b""
         self._connect_s = float(request["connect_s"])
+        self.n_strange = 0
+        """Lines that were no event: a client printed where it must not, or is damaged."""
         self.failure = ""
         """Why there will be no more frames; empty while there may be."""
 
@@ -92,6 +95,8 @@ class Tracker:
             self._explain_end()
             return []
         *lines, self._rest = (self._rest + (data or b"")).split(b"\n")
+        if len(self._rest) > _LINE_BYTES_MAX:
+            self.n_strange, self._rest = self.n_strange + 1, b""
         return [frame for line in lines if (frame := self._frame(line)) is not None]
 
     def close(self) -> None:
@@ -108,10 +113,18 @@ class Tracker:
         self._errors.close()
 
     def _frame(self, line: bytes) -> Frame | None:
-        event = json.loads(line)
-        if "error" in event:
-            self.failure = event["error"]
-        return Frame(event["t_s"], event["bodies"]) if "bodies" in event else None
+        """The frame of a line; None if it is another event, or nothing that the process would say."""
+        try:
+            event = dict(json.loads(line))
+            if "error" in event:
+                self.failure = str(event["error"])
+            if "bodies" not in event:
+                return None
+            bodies = {str(name): [float(v) for v in values] for name, values in event["bodies"].items()}
+            return Frame(float(event["t_s"]), bodies)
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            self.n_strange += 1
+            return None
 
     def _explain_end(self) -> None:
         code = self._process.wait(timeout=_END_S)

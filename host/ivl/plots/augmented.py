@@ -25,6 +25,7 @@ class Quantity:
     limits: tuple[float, float]
 
 
+@style.drawing
 def draw_space(
     data: Campaign, found: pd.DataFrame, quantity: Quantity, title: str, paths: Sequence[Path], dpi: int
 ) -> list[Path]:

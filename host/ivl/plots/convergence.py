@@ -31,6 +31,7 @@ def draw_run(result: RunResult) -> list[Path]:
     )
 
 
+@style.drawing
 def draw(
     experiment: Experiment,
     history: Sequence[EpisodeRow],

@@ -26,6 +26,7 @@ _ROWS = (
 """Column, label, limits of the axis (those of the search and a margin), where the paper's simulation ended."""
 
 
+@style.drawing
 def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw the cell nearest to the paper's experiment (2.5 m/s, 90 degrees).
 

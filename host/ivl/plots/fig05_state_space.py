@@ -15,6 +15,7 @@ from ivl.plots.spaces import RATE_MAP
 NAME = "fig05_state_space"
 
 
+@style.drawing
 def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw one point per trial.
 

@@ -18,6 +18,7 @@ _MIDDLE = 0.98
 """Share of the points that the axes show; stray triggers of trials that never learned lie far outside."""
 
 
+@style.drawing
 def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw one point per trial, in one panel by landing rate, in the other success and failure apart.
 

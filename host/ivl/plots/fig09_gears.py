@@ -23,6 +23,7 @@ NAME = "fig09_gears"
 ORDER = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
 
 
+@style.drawing
 def draw(data: Campaign, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw every gear of the run.
 

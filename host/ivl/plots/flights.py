@@ -23,6 +23,7 @@ _BAND_ROLLOUTS = 40
 _SPAN_S = (-0.02, 0.42)
 
 
+@style.drawing
 def draw(comparison: Comparison, world_of_row: Sequence[World], paths: Sequence[Path], title: str) -> list[Path]:
     """Draw a comparison.
 

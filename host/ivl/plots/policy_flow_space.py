@@ -22,6 +22,7 @@ _OUTER = 99.0
 _COLORS = {"landed": style.BLUE, "failed": style.VERMILION, "no flip": style.GREY}
 
 
+@style.drawing
 def draw(found: Survey, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw the space on the left, two plane views on the right.
 

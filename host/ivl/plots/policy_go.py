@@ -13,6 +13,7 @@ from ivl.policy.survey import Survey
 NAME = "policy_go"
 
 
+@style.drawing
 def draw(found: Survey, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw the shares with Wilson's 95 % intervals, and below them the numbers of landings and failures.
 

@@ -17,6 +17,7 @@ NAME = "policy_rates"
 _MOSTLY = 0.5
 
 
+@style.drawing
 def draw(found: Survey, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw three panels with one colour scale; crosses mark the cells that the policy's go / no-go mostly refuses.
 

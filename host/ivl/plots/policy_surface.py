@@ -21,6 +21,7 @@ _OUTLINES = ((BOX, "box", "-"), (PLANE, "plane", "--"))
 _ON_ANY_GROUND = [withStroke(linewidth=2.6, foreground="black")]
 
 
+@style.drawing
 def draw(general: General, theta: FloatArray, paths: Sequence[Path], dpi: int = style.DPI) -> list[Path]:
     """Draw threshold and probability over the sensed velocities, with the commanded regions.
 

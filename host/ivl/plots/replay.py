@@ -30,6 +30,7 @@ def choose(replayed: Sequence[Replayed], n: int = N_FLIGHTS) -> list[Replayed]:
     return [replayed[i] for i in sorted([*order[:2], *evenly])]
 
 
+@style.drawing
 def draw(replayed: Sequence[Replayed], paths: Sequence[Path]) -> list[Path]:
     """Draw some of the flights, one panel each.
 

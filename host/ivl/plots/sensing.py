@@ -9,6 +9,7 @@ _COLOURS = (style.BLUE, style.SKY, style.GREEN, style.ORANGE, style.VERMILION, s
 _MARKERS = "osDv^x+*"
 
 
+@style.drawing
 def draw(
     speeds_mps: Sequence[float], rates: Mapping[str, Sequence[float]], caption: str, paths: Sequence[Path]
 ) -> list[Path]:

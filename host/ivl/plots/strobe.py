@@ -52,6 +52,7 @@ def draw_last_landing(result: RunResult) -> list[Path]:
     return draw(result.world, trace, [result.folder / f"last_landing{suffix}" for suffix in (".png", ".svg")])
 
 
+@style.drawing
 def draw(world: World, trace: Trace, paths: Sequence[Path]) -> list[Path]:
     """Draw one landing; trigger and touch-down in colours of their own, the ghosts coloured by time.
 

@@ -1,23 +1,55 @@
-"""What the figures share: colours that colour-blind readers can tell apart (Okabe and Ito), and writing of files."""
+"""What the figures share: colours that colour-blind readers can tell apart (Okabe and Ito), settings, writing of files.
 
-from collections.abc import Sequence
+Every function that makes a figure is decorated with `drawing`: inside, matplotlib's settings are its own defaults and
+nobody else's, so that a picture has the same bytes in a notebook, under a user's matplotlibrc, and here; outside,
+nothing of it is left.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ivl import files
 from ivl.errors import ConfigError
 
 BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 SKY, PURPLE, GREY, DIM = "#56B4E9", "#CC79A7", "#7F7F7F", "#555555"
 SMALL, NORMAL = 8.0, 9.0
 DPI = 200
+_NO_DATE: dict[str, dict[str, Any]] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+_depth = 0
+
+
+def drawing(draw: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """Let a function draw with matplotlib's own defaults, whatever the settings around it are."""
+
+    @wraps(draw)
+    def drawn(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        global _depth  # noqa: PLW0603 - as global as the settings that it tells of
+        with mpl.rc_context():
+            mpl.rcdefaults()
+            mpl.rcParams["svg.hashsalt"] = "ivl"
+            _depth += 1
+            try:
+                return draw(*args, **kwargs)
+            finally:
+                _depth -= 1
+
+    return drawn
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure, without a window and without matplotlib's global state."""
+    """An empty figure, without a window; only inside a function that is decorated with `drawing`."""
+    if not _depth:
+        raise RuntimeError("a figure is made outside of a function that is decorated with ivl.plots.style.drawing")
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
@@ -52,12 +84,12 @@ def save(figure: Figure, paths: Sequence[Path], dpi: int = DPI) -> list[Path]:
     Raises:
         ConfigError: A file cannot be written, or its kind is unknown.
     """
-    settings: Any = {"svg.hashsalt": "ivl"}
     for path in paths:
-        metadata = {"Date": None} if path.suffix == ".svg" else None
         try:
-            with mpl.rc_context(settings):
-                figure.savefig(path, dpi=dpi, metadata=metadata)
-        except (OSError, ValueError) as error:
+            with files.replacing(path) as part:
+                figure.savefig(part, dpi=dpi, metadata=_NO_DATE.get(path.suffix))
+        except OSError as error:
+            raise ConfigError(f"{path}: the figure cannot be written: {files.reason(error)}") from error
+        except ValueError as error:
             raise ConfigError(f"{path}: the figure cannot be written: {error}") from error
     return list(paths)

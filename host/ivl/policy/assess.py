@@ -4,6 +4,9 @@ box, plane   landing rates of the flips, every approach flown (`go_p_min` 0)
 shaped       those of the plane, with the approach that first leads into the region where landings are possible
 go           on the plane: how well the estimate tells landings from failures, and what the policy's own `go_p_min`
              does with the same flights
+
+Flights of one approach, on several tasks or with several vehicles, are alike, and so are those of one drawn vehicle.
+The intervals know that.
 """
 
 from collections.abc import Sequence
@@ -12,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from ivl.analysis.intervals import Estimate, share_of, wilson, worst_tenth
+from ivl.analysis.intervals import Estimate, share_of_clusters, worst_tenth
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import go
 from ivl.policy.file import PolicyFile
 from ivl.policy.flying import Drawn, Place, PolicyTask, fly
+from ivl.policy.go import BoolArray
 from ivl.policy.region import BOX, PLANE, Approaches, Region, Series
 from ivl.policy.shape import FloatArray, General, is_general
 from ivl.seeds import Purpose
@@ -69,7 +73,8 @@ class Go:
         strikes_avoided: Share of the body strikes that are refused.
         refused_good: Share of all approaches that are refused although they would have landed.
         no_go: Share of all approaches that are refused.
-        level_out_contacts: Refused flights that touched the ceiling all the same.
+        level_out_contacts: Refused flights that touched the ceiling in the level-out.
+        contacts_before: Flights that touched it before they were refused.
         landed_of_flown: Share of landings among the approaches that are flown.
         p_min: The policy's own `go_p_min`.
     """
@@ -80,6 +85,7 @@ class Go:
     refused_good: Estimate
     no_go: Estimate
     level_out_contacts: int
+    contacts_before: int
     landed_of_flown: Estimate
     p_min: float
 
@@ -89,8 +95,35 @@ class Go:
         for name in ("strikes_avoided", "refused_good", "no_go", "landed_of_flown"):
             share = getattr(self, name)
             data[name], data[f"{name}_interval"] = share.value, [share.low, share.high]
-        data |= {"level_out_contacts": self.level_out_contacts, "p_min": self.p_min}
+        data |= {"level_out_contacts": self.level_out_contacts, "contacts_before_no_go": self.contacts_before}
+        data["p_min"] = self.p_min
         return {name: None if isinstance(value, float) and np.isnan(value) else value for name, value in data.items()}
+
+
+@dataclass(frozen=True)
+class Vehicles:
+    """Which vehicles flew.
+
+    Attributes:
+        drawn: What was drawn in place of each task's; None: the vehicles of the files.
+        learned_over: What the policy was learned over, likewise.
+    """
+
+    drawn: Drawn | None
+    learned_over: Drawn | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; null stands for the vehicles of the files."""
+        families = {"drawn": self.drawn, "learned_over": self.learned_over}
+        return {name: family.model_dump(mode="json") if family else None for name, family in families.items()}
+
+    def __str__(self) -> str:
+        """As people read it."""
+        flown, learned = (
+            f"{family.n_vehicles} drawn ones (seed {family.seed})" if family else "those of the files"
+            for family in (self.drawn, self.learned_over)
+        )
+        return f"{flown}; the policy was learned over {learned}"
 
 
 @dataclass(frozen=True)
@@ -102,16 +135,20 @@ class Assessment:
         plane: All approaches.
         shaped: The plane by the approach of `SHAPED`; None if the flight core has none.
         go: None if the form decides nothing.
+        vehicles: What flew.
     """
 
     box: Rates
     plane: Rates
     shaped: Rates | None
     go: Go | None
+    vehicles: Vehicles
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        parts = {"box": self.box, "plane": self.plane, "shaped": self.shaped, "go": self.go}
+        parts = {
+            "box": self.box, "plane": self.plane, "shaped": self.shaped, "go": self.go, "vehicles": self.vehicles,
+        }  # fmt: skip
         return {name: part.as_dict() if part is not None else None for name, part in parts.items()}
 
 
@@ -131,26 +168,21 @@ def assess(
         n_approaches: Fresh approaches of each region.
         seed: Their seed; they differ from those of any learning.
         threads: Worker threads; omitted: all processors.
-        family: Vehicles that are drawn in place of each task's; they differ from those of any learning. Intervals are
-            then those of a mean over vehicles.
+        family: Vehicles that are drawn in place of each task's; they differ from those of any learning. Omitted: the
+            vehicles of the files, also for a policy that was learned over a family.
 
     Raises:
         ConfigError: Vehicles are to be drawn, and the files of a task give no parameter a sigma.
     """
-    places = _places(tasks or policy.tasks, family)
-    theta = np.array(policy.values)
-    free = General(policy.form).always_go(theta) if is_general(policy.form) else theta
-
-    def rates(name: str, flown_by: Sequence[Place]) -> Rates:
-        approaches = fresh(_SERIES[name], n_approaches, seed)
-        flown = fly(flown_by, policy.form, free, approaches, threads)
-        return _rates(flown) if family is None else _rates_of_vehicles(flown)
-
+    flown_on = tasks or policy.tasks
+    bench = _Bench(policy, len(flown_on), n_approaches, seed, threads, family)
+    places = _places(flown_on, family)
     led = None
     if SHAPED in APPROACHES:
-        led = rates("shaped", _places([shaped(task) for task in tasks or policy.tasks], family))
-    judged = _go(General(policy.form), places, theta, n_approaches, seed, threads) if is_general(policy.form) else None
-    return Assessment(rates("box", places), rates("plane", places), led, judged)
+        led = bench.rates("shaped", _places([shaped(task) for task in flown_on], family))
+    go_no_go = bench.go(places) if is_general(policy.form) else None
+    vehicles = Vehicles(family, policy.training.family if policy.training else None)
+    return Assessment(bench.rates("box", places), bench.rates("plane", places), led, go_no_go, vehicles)
 
 
 def fresh(region: Region, n: int, seed: int) -> Approaches:
@@ -174,39 +206,75 @@ def shaped(task: PolicyTask) -> PolicyTask:
     return task.model_copy(update={"approach": SHAPED, "overrides": {**task.overrides, **room}})
 
 
-def _rates(flown: Sequence[Outcomes]) -> Rates:
-    landed, spotless = (np.concatenate([rate(outcomes) for outcomes in flown]) for rate in (four_leg, clean))
-    return Rates(share_of(landed), share_of(spotless), None, landed.size)
+class _Bench:
+    """Flies the fresh approaches in places, which are those of each task, vehicle by vehicle."""
 
+    def __init__(
+        self, policy: PolicyFile, n_tasks: int, n: int, seed: int, threads: int | None, family: Drawn | None
+    ) -> None:
+        self._policy, self._n_tasks, self._n, self._seed, self._threads = policy, n_tasks, n, seed, threads
+        self._is_family = family is not None
+        self._theta = np.array(policy.values)
 
-def _rates_of_vehicles(flown: Sequence[Outcomes]) -> Rates:
-    """Flights of one vehicle are alike, so the vehicles count for the intervals, not the flights."""
-    shares = np.array([[rate(outcomes).mean() for outcomes in flown] for rate in (four_leg, clean)])
-    landed, spotless = (_mean_over_vehicles(of) for of in shares)
-    return Rates(landed, spotless, worst_tenth(shares[0]), sum(outcomes.size for outcomes in flown))
+    def _fly(self, places: Sequence[Place], theta: FloatArray, region: Region) -> Outcomes:
+        """Outcomes of shape (..., tasks, vehicles, approaches) of policies (..., dim)."""
+        flown = fly(places, self._policy.form, theta, fresh(region, self._n, self._seed), self._threads)
+        stacked = np.stack(flown, axis=-2)
+        return stacked.reshape(*stacked.shape[:-2], self._n_tasks, -1, self._n)
 
+    def _share(self, happened: BoolArray, counted: BoolArray | None = None) -> Estimate:
+        """A share of flights (tasks, vehicles, approaches); tasks are given, vehicles and approaches are drawn."""
+        _, vehicle, approach = np.indices(happened.shape)
+        drawn = (approach, vehicle) if self._is_family else (approach,)
+        return share_of_clusters(happened, np.ones(happened.shape) if counted is None else counted, *drawn)
 
-def _mean_over_vehicles(shares: FloatArray) -> Estimate:
-    mean = float(shares.mean())
-    low, high = wilson(mean, shares.size)
-    return Estimate(mean, float(low), float(high), shares.size)
+    def rates(self, name: str, places: Sequence[Place]) -> Rates:
+        """Landing rates, every approach flown."""
+        general = is_general(self._policy.form)
+        theta = General(self._policy.form).always_go(self._theta) if general else self._theta
+        flown = self._fly(places, theta, _SERIES[name])
+        landed = four_leg(flown)
+        worst = None
+        if self._is_family:
+            worst = worst_tenth(landed.mean(axis=-1).ravel())
+        return Rates(self._share(landed), self._share(clean(flown)), worst, flown.size)
 
+    def go(self, places: Sequence[Place]) -> Go:
+        """What go / no-go is worth, over the plane."""
+        general, theta = General(self._policy.form), self._theta
+        free, own = self._fly(places, np.stack([general.always_go(theta), theta]), PLANE)
+        landed, refused = four_leg(free), own["no_go"] == 1
+        decided = go.has_decided(free)
+        p = free["p_land"][decided]
+        before, during = self._contacts(places, own)
+        return Go(
+            auc=go.auc(p, landed[decided]),
+            calibration_error=go.calibration_error(p, landed[decided]),
+            strikes_avoided=self._share(refused, go.strikes(free)),
+            refused_good=self._share(refused & landed),
+            no_go=self._share(refused),
+            level_out_contacts=during,
+            contacts_before=before,
+            landed_of_flown=self._share(four_leg(own), ~refused),
+            p_min=float(theta[general.go_p_min]),
+        )
 
-def _go(general: General, places: Sequence[Place], theta: FloatArray, n: int, seed: int, threads: int | None) -> Go:
-    approaches = fresh(PLANE, n, seed)
-    policies = np.stack([general.always_go(theta), theta])
-    flown = fly(places, general.form.name, policies, approaches, threads)
-    free, own = (np.concatenate([outcomes[i] for outcomes in flown]) for i in (0, 1))
-    landed, refused = four_leg(free), own["no_go"] == 1
-    decided = go.has_decided(free)
-    p = free["p_land"][decided]
-    return Go(
-        auc=go.auc(p, landed[decided]),
-        calibration_error=go.calibration_error(p, landed[decided]),
-        strikes_avoided=share_of(refused[go.strikes(free)]),
-        refused_good=share_of(refused & landed),
-        no_go=share_of(refused),
-        level_out_contacts=int((refused & np.isfinite(own["t_impact_s"])).sum()),
-        landed_of_flown=share_of(four_leg(own)[~refused]),
-        p_min=float(theta[general.go_p_min]),
-    )
+    def _contacts(self, places: Sequence[Place], own: Outcomes) -> tuple[int, int]:
+        """Refused flights of the plane that touched the ceiling: before they were called off, and in the level-out.
+
+        The outcome does not say when a flight was called off, so those few are flown again.
+        """
+        approaches = fresh(PLANE, self._n, self._seed)
+        of_places = own.reshape(len(places), self._n)
+        touched = (of_places["no_go"] == 1) & np.isfinite(of_places["t_impact_s"])
+        during = [
+            self._is_in_level_out(places[i], approaches, int(j), of_places[i, j]) for i, j in np.argwhere(touched)
+        ]
+        return len(during) - sum(during), sum(during)
+
+    def _is_in_level_out(self, place: Place, approaches: Approaches, i: int, outcome: Any) -> bool:
+        trace = place.world.trace(
+            float(approaches.speed_mps[i]), float(approaches.angle_deg[i]), *self._policy.values,
+            form=self._policy.form, seed=approaches.seed, stream=int(approaches.stream[i]), start=place.task.start,
+        )  # fmt: skip
+        return bool(outcome["t_impact_s"] >= place.world.called_off_s(trace))

@@ -3,24 +3,32 @@
     policy = file.load(Path("g.yaml"))
     world.rollouts(2.5, 60.0, *policy.values, form=policy.form)
 
-`digest` stands for all else in the file. Who writes a policy by hand leaves it out, with `training` and `score`.
+`digest` stands for all else in the file, `form_table` for the meaning of the numbers, and `crc` is what a vehicle calls
+the policy. A file in which one of them is wrong is refused. Who writes or changes a policy by hand says so with
+`digest: none`, and is believed; `form_table`, `crc`, `made_by`, `training` and `score` may then be left out.
 """
 
 import hashlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ivl import forms, yamlfile
+from ivl import files, forms, native, yamlfile
 from ivl.errors import ArgumentError, ConfigError
 from ivl.experiment import LearnerChoice
 from ivl.forms import Form
 from ivl.policy.flying import Drawn, PolicyTask
 from ivl.policy.region import RegionField
 from ivl.settings import Finite, Strict, check_overrides
+
+NONE = "none"
+"""Digest of a policy that was written or changed by hand."""
+_BY_HAND = f"digest: {NONE} accepts a policy that was written or changed by hand"
+
+Share = Annotated[Finite, Field(ge=0, le=1)]
 
 
 class Number(Strict):
@@ -47,12 +55,21 @@ class Training(Strict):
     interrupted: bool = Field(default=False, description="the best so far when somebody stopped it")
 
 
-class Score(Strict):
-    """Landing rates of the chosen policy over the approaches that chose it; `ivl policy assess` takes fresh ones."""
+class WithGo(Strict):
+    """The same approaches, with the policy's own go / no-go."""
 
-    landed: Finite = Field(ge=0, le=1)
-    clean: Finite = Field(ge=0, le=1)
-    flights: int = Field(ge=1)
+    refused: Share = Field(description="share of all approaches that are called off")
+    landed: Share = Field(description="share of all approaches that land")
+    clean: Share = Field(description="share of all approaches that land without body or rotor contact")
+
+
+class Score(Strict):
+    """Landing rates over the approaches that chose the policy; `ivl policy assess` takes fresh ones."""
+
+    flights: int = Field(ge=1, description="approaches of all tasks and vehicles")
+    landed: Share = Field(description="share that lands when every approach is flown, go / no-go off")
+    clean: Share = Field(description="share that lands without body or rotor contact then")
+    with_go: WithGo | None = Field(default=None, description="with go / no-go; null: it refuses nothing")
 
 
 class PolicyFile(Strict):
@@ -64,7 +81,10 @@ class PolicyFile(Strict):
     tasks: list[PolicyTask] = Field(min_length=1, description="what it was learned on")
     training: Training | None = None
     score: Score | None = None
-    digest: str | None = Field(default=None, description="SHA-256 of all else; null: written by hand")
+    made_by: str | None = Field(default=None, description="digest of the simulator library that wrote it")
+    form_table: str | None = Field(default=None, description="digest of the form's names, units and ranges")
+    crc: str | None = Field(default=None, description="checksum by which a vehicle names it, hexadecimal")
+    digest: str = Field(description=f"SHA-256 of all else in the file; {NONE}: written or changed by hand")
 
     @model_validator(mode="after")
     def _is_of_its_form(self) -> Self:
@@ -82,11 +102,6 @@ class PolicyFile(Strict):
             form.to_si(self.values)
         except ArgumentError as error:
             raise ValueError(f"theta: {error}") from error
-        if self.digest is not None and self.digest != self._digest():
-            raise ValueError(
-                f"digest: value {self.digest!r}: the file was changed after it was written "
-                "(leave digest out of a policy that is written by hand)"
-            )
         return self
 
     @property
@@ -100,18 +115,21 @@ class PolicyFile(Strict):
         return [self.theta[name].value for name in self.shape.names]
 
     @property
-    def crc(self) -> int:
+    def checksum(self) -> int:
         """Checksum by which a vehicle names it."""
         return self.shape.crc(self.values)
 
-    def _digest(self) -> str:
-        # without defaults: a field that a later version adds changes no digest
-        data = self.model_dump(mode="json", exclude={"digest"}, exclude_defaults=True)
-        return hashlib.sha256(json.dumps(data, sort_keys=True, allow_nan=False).encode()).hexdigest()
-
     def sealed(self) -> "PolicyFile":
-        """The same policy with its digest."""
-        return self.model_copy(update={"digest": self._digest()})
+        """The same policy with what vouches for it."""
+        marks = {"made_by": native.library().digest(), "form_table": self.shape.digest, "crc": f"{self.checksum:08x}"}
+        marked = self.model_copy(update=marks)
+        return marked.model_copy(update={"digest": _digest(marked.model_dump(mode="json"))})
+
+
+def _digest(data: dict[str, Any]) -> str:
+    """Of what is in a file, whatever this version's defaults are for what is not."""
+    rest = {name: value for name, value in data.items() if name != "digest"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def make(
@@ -119,7 +137,9 @@ def make(
 ) -> PolicyFile:
     """A policy with its digest; theta is in the order and units of the form."""
     numbers = {p.name: Number(value=float(v), unit=p.unit) for p, v in zip(form.params, theta, strict=True)}
-    made = PolicyFile(ivl_policy=1, form=form.name, theta=numbers, tasks=list(tasks), training=training, score=score)
+    made = PolicyFile(
+        ivl_policy=1, form=form.name, theta=numbers, tasks=list(tasks), training=training, score=score, digest=NONE
+    )
     return made.sealed()
 
 
@@ -129,12 +149,10 @@ def save(policy: PolicyFile, path: Path) -> None:
     Raises:
         ConfigError: The file cannot be written.
     """
-    draft = path.with_name(f".{path.name}.part")
     try:
-        draft.write_text(_text(policy), encoding="utf-8")
-        draft.replace(path)
+        files.write(path, _text(policy))
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error}") from error
+        raise ConfigError(f"{path}: cannot be written: {files.reason(error)}") from error
 
 
 def _text(policy: PolicyFile) -> str:
@@ -150,7 +168,24 @@ def load(path: Path) -> PolicyFile:
         ConfigError: One line naming file, field and what is allowed.
     """
     data: Any = yamlfile.read(path)
+    if isinstance(data, dict) and "digest" not in data:
+        raise ConfigError(f"{path.name}: digest: is missing ({_BY_HAND})")
     policy = yamlfile.validate(PolicyFile, data, path.name)
+    if policy.digest != NONE:
+        _check_marks(policy, _digest(data), path.name)
     for i, task in enumerate(policy.tasks):
         check_overrides(task.overrides, f"{path.name}: tasks.{i}")
     return policy
+
+
+def _check_marks(policy: PolicyFile, digest: str, label: str) -> None:
+    """Refuse a policy that is not what was written, or whose numbers mean something else here."""
+    form = policy.shape
+    marks = (
+        ("digest", policy.digest, digest, "the file was changed after it was written"),
+        ("form_table", policy.form_table, form.digest, f"the form {form.name} has other names, units or ranges here"),
+        ("crc", policy.crc, f"{policy.checksum:08x}", "a vehicle of this version calls the numbers otherwise"),
+    )
+    for name, said, found, why in marks:
+        if said != found:
+            raise ConfigError(f"{label}: {name}: value {said!r}, found {found!r}: {why} ({_BY_HAND})")

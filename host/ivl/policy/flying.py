@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,9 +20,12 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class PolicyTask(Setup):
-    """What a policy is learned on: a task without speed and angle."""
+    """What a policy is learned on: a task without speed and angle, whose flights come to a trigger of their own."""
 
     gear: str = Field(description="Landing gear; see `ivl list gears`.")
+    start: Literal["imparted", "flown"] = Field(
+        default="imparted", description="At the approach velocity (imparted), or from hover (flown)."
+    )
 
 
 class Drawn(Strict):
@@ -54,11 +58,22 @@ class Place:
 
 
 def fly(
-    places: Sequence[Place], form: str, theta: npt.ArrayLike, approaches: Approaches, threads: int | None = None
+    places: Sequence[Place],
+    form: str,
+    theta: npt.ArrayLike,
+    approaches: Approaches | Sequence[Approaches],
+    threads: int | None = None,
 ) -> list[Outcomes]:
     """Fly policies, shape (..., dim), over all approaches in each place.
 
     All policies meet the same approaches with the same random numbers.
+
+    Args:
+        places: Where.
+        form: Form of the policies.
+        theta: Their numbers.
+        approaches: The same in all places, or those of each place.
+        threads: Worker threads; omitted: all processors.
 
     Returns:
         Outcomes of each place, shape (..., n).
@@ -74,22 +89,27 @@ def fly_own(
 
 
 def _fly(
-    places: Sequence[Place], form: str, theta: FloatArray, approaches: Approaches, threads: int | None
+    places: Sequence[Place],
+    form: str,
+    theta: FloatArray,
+    approaches: Approaches | Sequence[Approaches],
+    threads: int | None,
 ) -> list[Outcomes]:
     """Fly policies whose shape (..., 1 or n, dim) meets that of the approaches, (n,)."""
     columns = np.moveaxis(theta, -1, 0)
+    batches = [approaches] * len(places) if isinstance(approaches, Approaches) else approaches
     return [
         place.world.rollouts(
-            approaches.speed_mps,
-            approaches.angle_deg,
+            batch.speed_mps,
+            batch.angle_deg,
             *columns,
             form=form,
-            seed=approaches.seed,
-            stream=approaches.stream,
+            seed=batch.seed,
+            stream=batch.stream,
             start=place.task.start,
             threads=threads,
         )
-        for place in places
+        for place, batch in zip(places, batches, strict=True)
     ]
 
 

@@ -45,7 +45,12 @@ class SearchSettings(Strict):
     """The search from there: all candidates of an iteration fly the same new approaches."""
 
     n_candidates: int = Field(default=16, ge=2, le=1000, description="policies of an iteration")
-    n_approaches: int = Field(default=250, ge=1, le=100_000, description="approaches of an iteration, in each region")
+    n_approaches: int = Field(
+        default=250,
+        ge=1,
+        le=100_000,
+        description="approaches of an iteration, in each region, for each vehicle",
+    )
     n_iterations: int = Field(default=60, ge=0, le=100_000)
     spread_per_s: Finite = Field(default=0.4, gt=0, le=10, description="first spread of the candidates' thresholds")
     spread_moment_norm: Finite = Field(

@@ -56,9 +56,13 @@ def would_refuse(outcomes: Outcomes, p_min: float) -> BoolArray:
 
 
 def fly_decisions(
-    general: General, places: Sequence[Place], theta: FloatArray, approaches: Approaches, threads: int | None = None
+    general: General,
+    places: Sequence[Place],
+    theta: FloatArray,
+    approaches: Sequence[Approaches],
+    threads: int | None = None,
 ) -> Decided:
-    """Fly a policy that always goes, and find out where it would have decided."""
+    """Fly a policy that always goes, on the approaches of each place, and find out where it would have decided."""
     told = np.stack([general.telling(theta, axis) for axis in (0, 1)])
     parts = []
     for outcomes in fly(places, general.form.name, told, approaches, threads):
@@ -68,7 +72,7 @@ def fly_decisions(
         flown = outcomes[0][decided]
         parts.append((x, z, four_leg(flown), strikes(flown)))
     x, z, landed, strike = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return Decided(x, z, landed, strike, len(places) * len(approaches))
+    return Decided(x, z, landed, strike, sum(map(len, approaches)))
 
 
 def fit(decided: Decided, ridge: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""From an experiment to a policy file: map, search, choice, go / no-go.
+"""From an experiment to a policy file: map, fit, search, choice, go / no-go.
 
 policy = learn(general.load(["experiments/general.yaml"]))
 """
@@ -9,18 +9,21 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ivl.errors import ConfigError
-from ivl.outcome import clean, four_leg
+from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import file, go, search
-from ivl.policy.file import PolicyFile, Score, Training
+from ivl.policy.file import PolicyFile, Score, Training, WithGo
 from ivl.policy.flying import Place, fly, objective
 from ivl.policy.general import GeneralExperiment
-from ivl.policy.region import Series
+from ivl.policy.polish import polish
+from ivl.policy.region import Approaches, Region, Series
 from ivl.policy.shape import FloatArray, General
-from ivl.policy.start import best_of, fit, fly_map
+from ivl.policy.start import best_of, fit, fly_map, moment_most_Nmm
 from ivl.seeds import Purpose
 
 _DIGITS = 7  # of a number in single precision, which is what a vehicle keeps
 _N_CHECKPOINTS = 5
+_TIMINGS_NORM = (0.5, 1.0)
+"""Parts of the map's error of the trigger's instant, over which it is smoothed when policies are looked up in it."""
 
 
 @dataclass(frozen=True)
@@ -114,22 +117,39 @@ class _Run:
             raise ConfigError(f"form {general.form.name}: the policy to start from is of the form {start.form}")
         self._say("map", 0.0)
         chosen = self._chosen
-        self._best = best_of(fly_map(chosen.map, chosen.regions, chosen.seed, general, self._places, self._threads))
-        if not self._best.weight.size:
+        flown = fly_map(chosen.map, chosen.regions, chosen.seed, general, self._places, self._threads)
+        self._best = best = best_of(flown)
+        if not best.weight.size:
             raise ConfigError("no approach of these regions ends in a landing, whatever threshold and moment")
-        theta = np.array(start.values) if start is not None else fit(general, self._best)
-        self.state = _State(general.always_go(theta), n_flights=self._best.n_flights)
+        theta = np.array(start.values) if start is not None else fit(general, best)
+        self.state = _State(general.always_go(theta), n_flights=best.n_flights)
+        if start is None:
+            self._say("fit", 0.0)
+            most_Nmm = moment_most_Nmm(self._places)
+            timing_s = [part * chosen.map.timing_s for part in _TIMINGS_NORM]
+            found = polish(general, flown, best, theta, most_Nmm, timing_s, chosen.seed)
+            self._begin_with_the_best_of([theta, *found])
         self.state.candidates.append(self.state.theta)
-        self._say("map", 1.0)
+        self._say("fit", 1.0)
+
+    def _begin_with_the_best_of(self, policies: list[FloatArray]) -> None:
+        """Flights tell which of the policies that the map gives is the best."""
+        known, search = self._known(), self._chosen.search
+        approaches = self._draw(self._chosen.regions, Purpose.START, search.n_approaches)
+        theta = np.stack(policies)
+        scores = objective(fly(self._places, self._general.form.name, theta, approaches, self._threads))
+        known.n_flights += len(theta) * sum(map(len, approaches))
+        known.theta = theta[int(np.argmax(scores))]
 
     def search(self) -> None:
         """Any learner, from there; keeps what it recommends now and then."""
         known, n = self._known(), self._chosen.search.n_iterations
         before = known.n_flights
+        n_drawn = self._chosen.search.n_approaches * len(self._chosen.regions) * len(self._places)
 
         def keep(at: search.Iteration) -> None:
             known.theta, known.mean, known.n_flights = at.theta, at.mean, before + at.n_flights
-            known.n_approaches = at.number * self._chosen.search.n_approaches * len(self._chosen.regions)
+            known.n_approaches = at.number * n_drawn
             if at.number == n or at.number % max(1, n // _N_CHECKPOINTS) == 0:
                 known.candidates.append(at.theta)
             self._say("search", at.number / n)
@@ -141,29 +161,44 @@ class _Run:
     def choose(self) -> None:
         """The best of start and recommendations, on approaches that none of them has met."""
         known = self._known()
-        approaches = Series(self._chosen.regions, self._chosen.seed, Purpose.SELECT).next(self._chosen.search.n_select)
+        approaches = self._choosing()
         found = []
         for i, theta in enumerate(known.candidates):
             self._say("choice", i / len(known.candidates))
-            flown = fly(self._places, self._general.form.name, _rounded(theta), approaches, self._threads)
-            known.n_flights += len(self._places) * len(approaches)
-            rates = [float(np.mean([rate(o).mean() for o in flown])) for rate in (four_leg, clean)]
+            flown, *rates = self._rates(_rounded(theta), approaches)
             found.append((float(objective(flown)), *rates))
         best = max(range(len(found)), key=lambda i: found[i][0])
         known.theta, known.start_objective, known.objective = known.candidates[best], found[0][0], found[best][0]
         _, landed, spotless = found[best]
-        known.score = Score(landed=landed, clean=spotless, flights=len(self._places) * len(approaches))
+        known.score = Score(landed=landed, clean=spotless, flights=sum(map(len, approaches)))
         self._say("choice", 1.0)
 
+    def _draw(self, regions: list[Region], purpose: Purpose, n: int) -> list[Approaches]:
+        """Approaches of a purpose, for each place."""
+        return Series(regions, self._chosen.seed, purpose).for_each(len(self._places), n)
+
+    def _choosing(self) -> list[Approaches]:
+        return self._draw(self._chosen.regions, Purpose.SELECT, self._chosen.search.n_select)
+
+    def _rates(self, theta: FloatArray, approaches: list[Approaches]) -> tuple[list[Outcomes], float, float]:
+        """Outcomes of a policy, and its shares of landings and of clean ones."""
+        flown = fly(self._places, self._general.form.name, theta, approaches, self._threads)
+        self._known().n_flights += sum(map(len, approaches))
+        landed, spotless = (float(np.mean([rate(o).mean() for o in flown])) for rate in (four_leg, clean))
+        return flown, landed, spotless
+
     def learn_go(self) -> None:
-        """Probability of a landing, and the least one that is flown."""
+        """Probability of a landing, the least one that is flown, and what this does to the score."""
         known, general, settings = self._known(), self._general, self._chosen.go
-        series = [Series([settings.region], self._chosen.seed, purpose) for purpose in (Purpose.GO, Purpose.HELD_OUT)]
+        drawn = [
+            self._draw([settings.region], purpose, n)
+            for purpose, n in ((Purpose.GO, settings.n_approaches), (Purpose.HELD_OUT, settings.n_held_out))
+        ]
         self._say("go / no-go", 0.0)
         theta = _rounded(known.theta)
-        learned = go.fly_decisions(general, self._places, theta, series[0].next(settings.n_approaches), self._threads)
+        learned = go.fly_decisions(general, self._places, theta, drawn[0], self._threads)
         self._say("go / no-go", 0.6)
-        held = go.fly_decisions(general, self._places, theta, series[1].next(settings.n_held_out), self._threads)
+        held = go.fly_decisions(general, self._places, theta, drawn[1], self._threads)
         known.n_flights += 2 * (learned.n_flights + held.n_flights)
         if learned.landed.all() or not learned.landed.any():
             self._say("go / no-go", 1.0)
@@ -172,8 +207,15 @@ class _Run:
         p_min = go.choose_p_min(
             go.probabilities(coefficients, held), held, settings.strikes_avoided_min, settings.refused_good_max
         )
-        known.theta = theta.copy()
-        known.theta[general.go], known.theta[general.go_p_min] = coefficients, p_min
+        theta[general.go], theta[general.go_p_min] = coefficients, p_min
+        score = known.score
+        if score is not None and p_min > 0.0:
+            self._say("go / no-go", 0.9)
+            flown, landed, spotless = self._rates(theta, self._choosing())
+            refused = float(np.mean([(outcomes["no_go"] == 1).mean() for outcomes in flown]))
+            with_go = WithGo(refused=refused, landed=landed, clean=spotless)
+            score = score.model_copy(update={"with_go": with_go})
+        known.theta, known.score = theta, score
         self._say("go / no-go", 1.0)
 
     def result(self, interrupted: bool) -> PolicyFile:

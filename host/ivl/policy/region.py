@@ -87,3 +87,7 @@ class Series:
         stream = np.arange(self._n_drawn, self._n_drawn + len(speed), dtype=np.uint64)
         self._n_drawn += len(speed)
         return Approaches(speed, angle, stream, self._seed)
+
+    def for_each(self, n_places: int, n: int) -> list[Approaches]:
+        """A batch of its own for each of some places, so that many vehicles together meet many approaches."""
+        return [self.next(n) for _ in range(n_places)]

@@ -1,6 +1,7 @@
 """The search from the map's policy on, by any learner of the project.
 
 In each iteration all candidates fly the same new approaches, so that they differ in what they are, not in their luck.
+Each place has approaches of its own: with few of them, the same for all vehicles of a family, luck would be in those.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,27 +43,35 @@ class Iteration:
     n_flights: int
 
 
-def make_search(chosen: GeneralExperiment, general: General, start: FloatArray, best: Best, most_Nmm: float) -> Learner:
-    """The learner at its start; it searches threshold and moment, the rest of theta stays as it is.
+@dataclass(frozen=True)
+class Scale:
+    """First spreads of the searched parameters, shape (n,), and their bounds, shape (n, 2)."""
 
-    The spread of each parameter changes the thresholds by the same amount.
-    """
-    settings = chosen.search
+    sigma: FloatArray
+    bounds: FloatArray
+
+
+def scale_of(general: General, best: Best, start: FloatArray, spread_per_s: float, spread_moment_Nmm: float) -> Scale:
+    """How far a search for threshold and moment goes; the spread of each parameter changes the thresholds alike."""
     middle = float(np.average(best.threshold_per_s, weights=best.weight))
     change = np.sqrt(np.mean(design(general, best.vx_mps, best.vz_mps, middle) ** 2, axis=0))
     change = np.maximum(change, _COLUMN_MIN * change.max())
-    sigma = np.append(
-        settings.spread_per_s / np.sqrt(general.n_threshold) / change,
-        np.full(3, settings.spread_moment_norm * most_Nmm),
-    )
+    sigma = np.append(spread_per_s / np.sqrt(general.n_threshold) / change, np.full(3, spread_moment_Nmm))
     mu = start[general.searched]
     lo, hi = general.bounds[general.searched].T
     bounds = np.stack([np.maximum(lo, mu - _REACH * sigma), np.minimum(hi, mu + _REACH * sigma)], axis=1)
+    return Scale(np.minimum(sigma, bounds[:, 1] - bounds[:, 0]), bounds)
+
+
+def make_search(chosen: GeneralExperiment, general: General, start: FloatArray, best: Best, most_Nmm: float) -> Learner:
+    """The learner at its start; it searches threshold and moment, the rest of theta stays as it is."""
+    settings = chosen.search
+    scale = scale_of(general, best, start, settings.spread_per_s, settings.spread_moment_norm * most_Nmm)
     return make_learner(
         chosen.learner.name,
-        mu,
-        np.minimum(sigma, bounds[:, 1] - bounds[:, 0]),
-        bounds=bounds,
+        start[general.searched],
+        scale.sigma,
+        bounds=scale.bounds,
         n_rollouts=settings.n_candidates,
         seed=derive(chosen.seed, Purpose.LEARNER),
         **chosen.learner.options,
@@ -88,10 +97,10 @@ def run(
             return
         asked = learner.ask()
         theta = _whole(general, start, asked)
-        approaches = series.next(settings.n_approaches)
+        approaches = series.for_each(len(places), settings.n_approaches)
         scores = objective(fly(places, general.form.name, theta, approaches, threads))
         learner.tell(asked, scores)
-        n_flights += len(places) * len(theta) * len(approaches)
+        n_flights += len(theta) * sum(map(len, approaches))
         recommended = _whole(general, start, learner.result.recommended)
         on_iteration(Iteration(number, recommended, float(scores.mean()), float(scores.max()), n_flights))
 

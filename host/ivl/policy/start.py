@@ -54,7 +54,7 @@ class Map:
         speed_edges_mps: Edges of the cells along the speed, shape (n + 1,).
         angle_edges_deg: Edges along the angle, shape (m + 1,).
         tau_s: 1 / threshold of each policy, rising.
-        timing_s: Error of the trigger's instant over which `smoothed` is a mean.
+        timing_s: Error of the trigger's instant over which `smoothed` is a mean, unless it is told another.
         moments_Nmm: Moments.
         flown: Outcomes of each place, shape (moments, thresholds, cells); the angle of the cells runs faster.
     """
@@ -66,9 +66,9 @@ class Map:
     moments_Nmm: FloatArray
     flown: list[Outcomes]
 
-    def smoothed(self) -> list[FloatArray]:
-        """Scores of each place, smoothed."""
-        return [smooth(score(outcomes), self.tau_s, self.timing_s) for outcomes in self.flown]
+    def smoothed(self, timing_s: float | None = None) -> list[FloatArray]:
+        """Scores of each place, smoothed over the map's own error of the trigger's instant, or over another."""
+        return [smooth(score(outcomes), self.tau_s, timing_s or self.timing_s) for outcomes in self.flown]
 
     def best_of_all(self) -> tuple[float, float]:
         """Threshold and moment with the best mean score over all cells and places."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ivl import files
 from ivl.errors import ConfigError, StoreError
 from ivl.policy.assess import Assessment
 from ivl.policy.file import PolicyFile
@@ -77,9 +78,9 @@ def write_policy(policy: PolicyFile, name: str, found: Survey, judged: Assessmen
 def _save(data: dict[str, Any], album: Album, path: Path) -> Report:
     text = page.render(data)
     try:
-        path.write_text(text, encoding="utf-8")
+        files.write(path, text)
     except OSError as error:
-        raise ConfigError(f"{path}: the report cannot be written: {error}") from error
+        raise ConfigError(f"{path}: the report cannot be written: {files.reason(error)}") from error
     return Report(path, path.stat().st_size, len(album.landings), album.n_different)
 
 

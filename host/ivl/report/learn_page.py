@@ -31,7 +31,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
         StoreError: The folder holds no run, nothing is finished, or another process is working on it.
     """
     experiment, n_trials = run.read_config(folder)
-    with RunStore.open_existing(folder, native.library().outcome_dtype) as store:
+    with RunStore.open_reading(folder, native.library().outcome_dtype) as store:
         history, rollouts = store.episodes(), store.rollouts(trial=0)
     album, numbers = Album(experiment.reward), np.full(len(rollouts), -1)
     scored = np.flatnonzero(rollouts.status == SCORED)

@@ -58,7 +58,7 @@ def _facts(policy: PolicyFile) -> list[list[str]]:
     facts = [
         ["Vehicle and gear", "; ".join(dict.fromkeys(f"{t.vehicle}, {t.gear_set}/{t.gear}" for t in tasks))],
         ["Form", f"{policy.form}, {policy.shape.n} numbers"],
-        ["Checksum on a vehicle", f"{policy.crc:08x}"],
+        ["Checksum on a vehicle", f"{policy.checksum:08x}"],
     ]
     if policy.training is not None:
         facts.append(["Learned by", f"{policy.training.learner.name}, {policy.training.rollouts} flights"])
@@ -79,12 +79,14 @@ def _numbers(judged: Assessment) -> dict[str, Any]:
         _row("go / no-go: refused although they would land", judged.go.refused_good),
         _row("go / no-go: body strikes avoided", judged.go.strikes_avoided),
         _row("go / no-go: landings among those flown", judged.go.landed_of_flown),
-        ["go / no-go: contacts of refused flights", str(judged.go.level_out_contacts), ""],
+        ["go / no-go: contacts in level-outs", str(judged.go.level_out_contacts), ""],
+        ["go / no-go: contacts before the refusal", str(judged.go.contacts_before), ""],
         ["go / no-go: AUC", _number(judged.go.auc), ""],
         ["go / no-go: calibration error", _number(judged.go.calibration_error), ""],
         ["go / no-go: refused below a probability of", f"{judged.go.p_min:g}", ""],
     ]
-    note = f"{judged.plane.n_flights} fresh flights of each region; rates of the regions are of every approach flown."
+    note = f"{judged.plane.n_flights} fresh flights of each region; rates of the regions are of every approach flown. "
+    note += f"Vehicles: {judged.vehicles}."
     return {"head": ["", "value", "95 % interval"], "rows": rows, "note": note}
 
 
@@ -140,7 +142,7 @@ def _first(*masks: BoolArray) -> int | None:
 
 
 def _same(flown: Any) -> Callable[[Any], bool]:
-    """Whether an outcome is the one that was counted; what go / no-go said is told, and changes nothing."""
+    """Whether an outcome is the one that was counted; what go / no-go decided does not count."""
 
     def same(record: Any) -> bool:
         batch: Outcomes = np.array([record], dtype=flown.dtype)

@@ -1,9 +1,9 @@
 """A landing in few numbers: what the page needs to draw it at any time, and nothing else.
 
 Only the rows are kept that linear interpolation needs to be within the tolerances below, so that rows are rare where
-the motion is plain and dense where it turns: around the trigger and the contacts. Places and attitudes are told in the
-frame of the surface, so that the page draws any surface as its plane z = 0. Feet are told in body axes, where they rest
-while they are free, and by their place on the surface while they are stuck. Numbers are whole multiples of
+the motion is plain and dense where it turns: around the trigger and the contacts. Places and attitudes are given in the
+frame of the surface, so that the page draws any surface as its plane z = 0. Feet are given in body axes, where they
+rest while they are free, and by their place on the surface while they are stuck. Numbers are whole multiples of
 the units of `SCALE`, each column as differences, which is what makes them small once compressed.
 """
 

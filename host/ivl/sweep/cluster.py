@@ -3,12 +3,18 @@
 open_client(None)                 one process per processor of this machine
 open_client("tcp://host:8786")    a scheduler that is running (`dask scheduler`, `dask worker`)
 open_client("slurm", workers=64)  jobs of a batch system, as dask-jobqueue's configuration describes them
+
+A cluster that is started here can be reached by its owner alone: its parts know each other by certificates that exist
+in memory only (under SLURM, in files that the owner alone can read), and there is no dashboard.
 """
 
 import importlib
+import logging
 import os
+import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import dask
@@ -18,6 +24,10 @@ from ivl.errors import ConfigError, RolloutError
 
 _dask: Any = distributed  # its calls carry no types
 _CONNECT_S = 20.0
+WORKER_BYTES = 350 * 2**20
+"""Memory that a worker needs."""
+_FILES, _FILES_PER_WORKER = 64, 24
+"""Open files that client and scheduler need, and each worker more."""
 _SETTINGS = {
     # a worker's arrays come and go by the thousand; giving memory back to the system each time doubles the run time
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 2**28,
@@ -42,7 +52,7 @@ def open_client(scheduler: str | None, workers: int | None = None) -> Iterator[A
     check(scheduler, workers)
     with dask.config.set(_SETTINGS):
         if scheduler is None:
-            with _local(workers or processors()) as cluster, _dask.Client(cluster) as client:
+            with _local(workers) as cluster, _dask.Client(cluster) as client:
                 yield client
         elif scheduler == "slurm":
             with _slurm(workers) as cluster, _dask.Client(cluster) as client:
@@ -58,6 +68,8 @@ def check(scheduler: str | None, workers: int | None) -> None:
     Raises:
         ConfigError: See `open_client`.
     """
+    if scheduler is None:
+        _check_limits(workers or default_workers())
     if scheduler == "slurm" and workers is None:
         raise ConfigError("--scheduler slurm: say how many workers to ask for with --workers")
     if scheduler not in (None, "slurm"):
@@ -72,8 +84,57 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _local(workers: int) -> Any:
-    return _dask.LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0")
+def default_workers() -> int:
+    """Processes on this machine where nobody says how many: one per processor, as far as there is memory."""
+    return max(min(processors(), _memory_bytes() // WORKER_BYTES), 1)
+
+
+def _memory_bytes() -> int:
+    """Memory of this machine, or what is allowed of it."""
+    return int(importlib.import_module("distributed.system").memory_limit())
+
+
+def _local(workers: int | None) -> Any:
+    """A cluster of processes on this machine that its owner alone can reach.
+
+    Raises:
+        RolloutError: It cannot be started.
+    """
+    n = workers or default_workers()
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)  # what goes wrong at the start is said once, below
+    try:
+        return _dask.LocalCluster(
+            n_workers=n, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
+            security=_security(),
+        )  # fmt: skip
+    except (RuntimeError, OSError, TimeoutError, MemoryError) as error:
+        what = " ".join(str(error).split())[:200] or type(error).__name__
+        raise RolloutError(f"{n} workers cannot be started: {what} (try fewer --workers, then --resume)") from error
+    finally:
+        logger.setLevel(level)
+
+
+def _check_limits(n: int) -> None:
+    memory, needed = _memory_bytes(), n * WORKER_BYTES
+    if memory < needed:
+        fit = memory // WORKER_BYTES
+        advice = f"use --workers {fit}" if fit else "allow more memory (ulimit -m, -v)"
+        raise ConfigError(
+            f"--workers {n}: needs {needed / 2**20:.0f} MiB of memory, here are {memory / 2**20:.0f} MiB: {advice}"
+        )
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    files = _FILES + n * _FILES_PER_WORKER
+    if hard != resource.RLIM_INFINITY and hard < files:
+        raise ConfigError(f"--workers {n}: needs {files} open files, allowed are {hard}: raise the limit (ulimit -n)")
+    if soft != resource.RLIM_INFINITY and soft < files:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (files, hard))
+
+
+def _security() -> Any:
+    """Certificates that are made for this cluster alone."""
+    return _dask.Security.temporary()
 
 
 def _slurm(workers: int | None) -> Any:
@@ -82,11 +143,24 @@ def _slurm(workers: int | None) -> Any:
     except ImportError as error:
         raise ConfigError("--scheduler slurm: dask-jobqueue is not installed (extra `cluster`)") from error
     try:
-        cluster = jobqueue.SLURMCluster(scheduler_options={"dashboard_address": ":0"})
+        cluster = jobqueue.SLURMCluster(
+            security=_security(), shared_temp_directory=_shared_folder(), scheduler_options={"dashboard": False}
+        )
     except ValueError as error:
         raise ConfigError(f"--scheduler slurm: jobqueue.slurm in Dask's configuration: {error}") from error
     cluster.scale(workers)
     return cluster
+
+
+def _shared_folder() -> str:
+    """Where a batch system's cluster has its certificates: all its machines see this folder, and its owner alone."""
+    chosen = dask.config.get("jobqueue.slurm.shared-temp-directory", None)
+    if chosen:
+        return str(chosen)
+    folder = Path.home() / ".cache" / "ivl"
+    folder.mkdir(parents=True, exist_ok=True)
+    folder.chmod(0o700)
+    return str(folder)
 
 
 def _connect(address: str) -> Any:

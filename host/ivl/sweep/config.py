@@ -20,7 +20,7 @@ from typing import Any, Literal, Self, TypeVar
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
-from ivl import experiment, forms, model, native, yamlfile
+from ivl import experiment, forms, model, native, references, yamlfile
 from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.experiment import (
     Bounds,
@@ -155,7 +155,7 @@ class _Grid(Setup, Named):
             ConfigError: The sweep has no such variant.
         """
         for varied in self.variants():
-            if all(row[column_of(path)] == as_cell(value) for path, value in varied):
+            if all(row[column_of(path)] == as_cell(_identity(path, value)) for path, value in varied):
                 return varied
         raise ConfigError(f"{self.name}: a row of its tables is of no variant of the sweep")
 
@@ -199,17 +199,24 @@ class _Grid(Setup, Named):
         What is flown is part of it as far as it is varied; how it is learned is not, so that learners are compared on
         the same random numbers.
         """
-        name = f"{self.vehicle}|{self.gear_set}|{gear}|{float(speed_mps)!r}|{float(angle_deg)!r}"
+        vehicle, gear_set = references.identity(self.vehicle), references.identity(self.gear_set)
+        name = f"{vehicle}|{gear_set}|{gear}|{float(speed_mps)!r}|{float(angle_deg)!r}"
         for path in sorted(self.vary):
             if path in AXES or path in _SEED_HAS or not is_flown(path):
                 continue
             (value,) = self.vary[path]  # of one variant, see `at`
-            name += f"|{path}={value!r}"
+            name += f"|{path}={_identity(path, value)!r}"
         return name
 
     def to_yaml(self) -> str:
         """The resolved file, every default written out."""
         return yamlfile.dump(self.model_dump(mode="json"))
+
+
+def _identity(path: str, value: Value) -> Value:
+    """A varied value as tables and random numbers name it."""
+    named: Value = references.identity(value) if path in references.FIELDS else value
+    return named
 
 
 class StartRange(PerParameter):

@@ -1,7 +1,8 @@
 """The engine: tasks to a cluster, finished ones to the run folder, until nothing is left.
 
-    result = run(load_sweep("sweeps/smoke.yaml"), Path("runs/smoke"))
-    print(result.n_trials, result.n_failed)
+    if __name__ == "__main__":  # the workers import this file, too
+        result = run(load_sweep("sweeps/smoke.yaml"), Path("runs/smoke"))
+        print(result.n_trials, result.n_failed)
 
 The client alone writes, each task as soon as it is back: workers share no file system with it, and whatever is cut off
 loses the tasks that were running. A task whose worker is lost goes to another one; a trial that raises is reported in
@@ -13,18 +14,19 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import distributed
 
-from ivl import native
+from ivl import native, numerics, references
 from ivl.errors import NativeError, RolloutError
 from ivl.sweep import cluster, folder, plan, schema, store
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.plan import DaskTask
-from ivl.sweep.work import lost, record, run_packed
+from ivl.sweep.vary import Varied, world_name
+from ivl.sweep.work import limit_s, lost, record, run_packed
 from ivl.world import World
 
 _dask: Any = distributed  # its calls carry no types
@@ -108,16 +110,41 @@ def run(
     """
     cluster.check(scheduler, workers)
     worlds = grid.worlds()
-    size = task_size or plan.good_size(grid, workers or cluster.processors())
-    with closing(folder.open_run(run_folder, grid, worlds, size, resume)) as opened:
-        tasks = plan.plan(grid, opened.task_size)
+    packed, copies = references.pack(grid)
+    size = task_size or plan.good_size(grid, workers or cluster.default_workers())
+    with closing(folder.open_run(run_folder, packed, _renamed(grid, worlds), size, resume, copies)) as opened:
+        tasks = [replace(task, varied=_identities(task.varied)) for task in plan.plan(grid, opened.task_size)]
         done = store.finished_tasks(run_folder)
-        session = _Session(run_folder, grid, worlds, tasks, done, on_standing)
+        session = _Session(run_folder, packed, _renamed(grid, worlds), tasks, done, on_standing)
         session.tell()
         if session.waiting:
             with cluster.open_client(scheduler, workers) as client:
                 session.fly(client)
         return session.result()
+
+
+def _in_words(error: Exception, limit_s: float) -> Exception:
+    """What happened to a task that no worker could finish."""
+    if not isinstance(error, distributed.KilledWorker):
+        return error
+    return RolloutError(
+        f"its worker died {RETRIES} times or more: of too little memory (use fewer --workers), killed by somebody, or "
+        f"because the task took longer than {limit_s:.0f} s"
+    )
+
+
+def _identities(varied: Varied) -> Varied:
+    """The values of a variant, files by what stands for them in a run."""
+    return tuple((path, references.identity(value) if path in references.FIELDS else value) for path, value in varied)
+
+
+def _renamed(grid: Sweep | PolicyMap, worlds: dict[str, World]) -> dict[str, World]:
+    """The worlds by names in which files are called by what stands for them in a run."""
+    found = {}
+    for varied in grid.variants():
+        for gear in grid.at(varied).gear_names():
+            found[world_name(gear, _identities(varied))] = worlds[world_name(gear, varied)]
+    return found
 
 
 class _Session:
@@ -179,6 +206,8 @@ class _Session:
                 self._worlds[task.world],
                 task,
                 self._library_sha256,
+                numerics.kernel(),
+                limit_s(self._grid, task),
                 key=f"{self._grid.name}-{self._id}-{task.number}",
                 retries=RETRIES,
                 pure=False,
@@ -196,7 +225,7 @@ class _Session:
         elif isinstance(error, NativeError):
             raise error
         else:
-            done = lost(self._grid, task, error)
+            done = lost(self._grid, task, _in_words(error, limit_s(self._grid, task)))
         store.write_part(self._run, task.number, {**done.parts, schema.TASKS: record(task, done)})
         self._n_tasks += 1
         self._n_done += len(task.trials)

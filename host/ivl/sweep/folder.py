@@ -10,17 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import ivl
-from ivl import native, yamlfile
+from ivl import files, native, numerics, references, yamlfile
 from ivl.errors import ConfigError, StoreError
 from ivl.layout import EMPTY, layout_of
 from ivl.run import git_commit
-from ivl.store import lock_folder, write_durably, write_json
+from ivl.store import lock_folder, write_json
 from ivl.sweep import schema, store
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.world import World
 
 _PACKAGES = ("numpy", "pyarrow", "dask", "distributed")
-_LEFT_BY_A_CREATION = {"lock", "sweep.yaml", "map.yaml", "sweep.yaml.part", "map.yaml.part", "manifest.json.part"}
+_LEFT_BY_A_CREATION = {"lock", "sweep.yaml", "map.yaml", references.FOLDER}
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,15 @@ class OpenRun:
         os.close(self.lock)
 
 
-def open_run(run: Path, grid: Sweep | PolicyMap, worlds: Mapping[str, World], task_size: int, resume: bool) -> OpenRun:
-    """Begin a run, or continue one.
+def open_run(
+    run: Path,
+    grid: Sweep | PolicyMap,
+    worlds: Mapping[str, World],
+    task_size: int,
+    resume: bool,
+    copies: Mapping[str, bytes] | None = None,
+) -> OpenRun:
+    """Begin a run, or continue one; grid and copies are those of `ivl.references.pack`.
 
     Raises:
         StoreError: The folder holds something else, nothing to resume, another run, or is in use.
@@ -52,7 +59,7 @@ def open_run(run: Path, grid: Sweep | PolicyMap, worlds: Mapping[str, World], ta
         run.mkdir(parents=True, exist_ok=True)
         lock = lock_folder(run)
     except OSError as error:
-        raise StoreError(f"{run}: cannot be written: {error}") from error
+        raise StoreError(f"{run}: cannot be written: {files.reason(error)}") from error
     try:
         manifest = make_manifest(grid, worlds, task_size)
         if resume:
@@ -60,9 +67,13 @@ def open_run(run: Path, grid: Sweep | PolicyMap, worlds: Mapping[str, World], ta
             store.clear_unfinished(run)
         else:
             _check_empty(run)
-            write_durably(run / f"{_kind(grid)}.yaml", grid.to_yaml().encode())
+            references.save(copies or {}, run)
+            files.write(run / f"{_kind(grid)}.yaml", grid.to_yaml())
             write_json(run / "manifest.json", manifest)
         return OpenRun(int(store.read_manifest(run)["task_size"]), lock)
+    except OSError as error:
+        os.close(lock)
+        raise StoreError(f"{run}: cannot be written: {files.reason(error)}") from error
     except BaseException:
         os.close(lock)
         raise
@@ -74,6 +85,7 @@ def make_manifest(grid: Sweep | PolicyMap, worlds: Mapping[str, World], task_siz
     layout = EMPTY if isinstance(grid, PolicyMap) else layout_of(grid)
     return {
         "schema_version": schema.SCHEMA_VERSION,
+        "vouched": True,
         _kind(grid): grid.model_dump(mode="json"),
         "vehicle": grid.vehicle,
         "gear_set": grid.gear_set,
@@ -88,6 +100,7 @@ def make_manifest(grid: Sweep | PolicyMap, worlds: Mapping[str, World], task_siz
         "git_commit": git_commit(),
         "python": platform.python_version(),
         "packages": {name: version(name) for name in _PACKAGES},
+        "numerics": numerics.kernel(),
         "platform": platform.platform(),
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         "units": {kind: schema.units(kind, layout) for kind in kinds},
@@ -115,7 +128,9 @@ def _resolved(kind: str, data: dict[str, Any]) -> dict[str, Any]:
 def _check_empty(run: Path) -> None:
     if (run / "manifest.json").exists():
         raise StoreError(f"{run}: holds a run already: continue it with --resume, or choose another --out")
-    foreign = sorted(path.name for path in run.iterdir() if path.name not in _LEFT_BY_A_CREATION)
+    foreign = sorted(
+        path.name for path in run.iterdir() if path.name not in _LEFT_BY_A_CREATION and not files.is_leftover(path.name)
+    )
     if foreign:
         raise StoreError(f"{run}: is not empty ({foreign[0]} ...) and holds no run: choose another --out")
 
@@ -134,3 +149,8 @@ def _check_same(run: Path, new: Mapping[str, Any]) -> None:
             raise StoreError(
                 f"{run}: cannot be resumed: the {what} changed since it began, so its tables would mix two models"
             )
+    if old.get("numerics", new["numerics"]) != new["numerics"]:
+        raise StoreError(
+            f"{run}: cannot be resumed: it was computed by {old['numerics']}, here is {new['numerics']} "
+            f"({numerics.ADVICE})"
+        )

@@ -1,11 +1,15 @@
 """The run folder of a sweep: open columnar files that are there whole or not at all.
 
 A finished task leaves one Parquet part of each kind of table, named after the task; that of `tasks` is written last and
-means that the others are there. So a run that was cut off at any moment loses the running tasks and nothing else, and
-what is done can be read while the rest is still flown.
+vouches for the others: it carries their digests. Files that no task vouches for are no part of the run. So a run that
+was cut off at any moment loses the running tasks and nothing else, and what is done can be read while the rest is still
+flown.
 """
 
+import hashlib
+import io
 import json
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,11 +19,16 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 import xarray as xr
 
+from ivl import files
 from ivl.errors import StoreError
 from ivl.layout import Layout
-from ivl.store import check_version, write_durably
+from ivl.store import check_version
 from ivl.sweep import schema
 from ivl.sweep.schema import CELL, KINDS, SCHEMA_VERSION, TASKS, TRIAL_KEY, VERSION_KEY
+
+INDEX_KEY = b"ivl_parts"
+"""Key of the metadata of a part of `tasks`: SHA-256 of each other part of the task, by kind, as `sealed` writes it."""
+_PART = re.compile(r"\d{6,}\.parquet")
 
 _SORT = {
     schema.TRIALS: TRIAL_KEY,
@@ -65,8 +74,13 @@ def read_table(run: Path | str, kind: str) -> pa.Table:
     if kind not in KINDS:
         raise StoreError(f"{run}: no table {kind!r} (allowed {', '.join(KINDS)})")
     wanted = schema.schema(kind, read_layout(run))
-    paths = sorted((Path(run) / kind).glob("*.parquet"))
-    parts = [_read_part(path, wanted) for path in paths]
+    paths, parts = [], []
+    for number, index in sorted(_index(Path(run)).items()):
+        path = _part(Path(run), kind, number)
+        if kind != TASKS and not _is_vouched(path, kind, index):
+            continue
+        paths.append(path)
+        parts.append(_read_part(path, wanted, index.get(kind) if index else None))
     if not parts:
         return wanted.empty_table()
     varied = schema.varied_columns(parts[0].schema.names)
@@ -137,11 +151,59 @@ def to_xarray(run: Path | str, kind: str = schema.TRIALS) -> xr.Dataset:
     return data
 
 
-def _read_part(path: Path, wanted: pa.Schema) -> pa.Table:
+def _part(run: Path, kind: str, number: int) -> Path:
+    return run / kind / f"{number:06d}.parquet"
+
+
+def _index(run: Path) -> dict[int, dict[str, str] | None]:
+    """Digests of the parts by kind, by number of the finished task; None for a run that was written without them.
+
+    Raises:
+        StoreError: The record of a task cannot be read, or is that of another task.
+    """
+    return {int(path.stem): _vouched(path) for path in _records(run)}
+
+
+def _records(run: Path) -> list[Path]:
+    return sorted(path for path in (run / TASKS).glob("*.parquet") if _PART.fullmatch(path.name))
+
+
+def _vouched(path: Path) -> dict[str, str] | None:
     try:
-        table = pq.read_table(path, partitioning=None)
-    except (OSError, pa.ArrowInvalid) as error:
-        raise StoreError(f"{path}: cannot be read: {error}") from error
+        table = pq.read_table(io.BytesIO(path.read_bytes()))
+        numbers = table.column("task").to_pylist()
+        text = (table.schema.metadata or {}).get(INDEX_KEY)
+        index = None if text is None else json.loads(text)
+        if index is not None and sealed(table, index["parts"]) != text:
+            raise ValueError("it is not as it was written")
+    except (OSError, pa.ArrowException, KeyError, ValueError, TypeError) as error:
+        raise StoreError(f"{path}: cannot be read: {error}; continue the run with --resume") from error
+    if numbers != [int(path.stem)]:
+        raise StoreError(f"{path}: is the record of task {numbers}: remove it, then continue the run with --resume")
+    if index is None and read_manifest(path.parents[1]).get("vouched"):
+        raise StoreError(f"{path}: is not as it was written; continue the run with --resume")
+    return None if index is None else dict(index["parts"])
+
+
+def sealed(table: pa.Table, parts: Mapping[str, str]) -> bytes:
+    """Digests of the parts of a task, with one of themselves and of the record `table` that carries them."""
+    rows = json.dumps([dict(parts), table.to_pylist()], sort_keys=True)
+    seal = {"parts": dict(parts), "sha256": hashlib.sha256(rows.encode()).hexdigest()}
+    return json.dumps(seal, sort_keys=True).encode()
+
+
+def _is_vouched(path: Path, kind: str, index: Mapping[str, str] | None) -> bool:
+    return kind in index if index is not None else path.exists()
+
+
+def _read_part(path: Path, wanted: pa.Schema, sha256: str | None) -> pa.Table:
+    try:
+        data = path.read_bytes()
+        if sha256 is not None and hashlib.sha256(data).hexdigest() != sha256:
+            raise StoreError(f"{path}: is not as it was written; --resume flies its task again")
+        table = pq.read_table(io.BytesIO(data))
+    except (OSError, pa.ArrowException, ValueError, KeyError) as error:
+        raise StoreError(f"{path}: cannot be read: {error}; --resume flies its task again") from error
     version = (table.schema.metadata or {}).get(VERSION_KEY, b"?").decode()
     if version != str(SCHEMA_VERSION):
         raise StoreError(f"{path}: schema version {version}, this program reads {SCHEMA_VERSION}")
@@ -153,23 +215,51 @@ def _read_part(path: Path, wanted: pa.Schema) -> pa.Table:
 
 
 def finished_tasks(run: Path) -> set[int]:
-    """Numbers of the tasks whose results are in the run folder, those with failures not counted."""
-    done, failed = ({int(path.stem) for path in (run / kind).glob("*.parquet")} for kind in (TASKS, schema.FAILURES))
-    return done - failed
+    """Numbers of the tasks whose results are in the run folder, whole and without failures."""
+    return {int(path.stem) for path in _records(run) if _is_whole(run, path)}
+
+
+def _is_whole(run: Path, record: Path) -> bool:
+    """Whether all that a task sent back is there as it was written, and nothing of it failed."""
+    try:
+        index = _vouched(record)
+    except StoreError:
+        return False  # it is flown again
+    if index is None:
+        return not (run / schema.FAILURES / record.name).exists()
+    return schema.FAILURES not in index and all(
+        _sha256(run / kind / record.name) == sha256 for kind, sha256 in index.items()
+    )
+
+
+def _sha256(path: Path) -> str:
+    """Digest of a file; empty if it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return ""
 
 
 def clear_unfinished(run: Path) -> None:
     """Remove parts of tasks that were cut off or had failures, so that they can be flown again."""
     keep = finished_tasks(run)
     for kind in (TASKS, *(k for k in KINDS if k != TASKS)):  # the record first, so that a cut in here is harmless
-        for path in (run / kind).glob("*.parquet*"):
-            if path.suffix != ".parquet" or int(path.stem) not in keep:
+        for path in (run / kind).glob("*"):
+            stale = _PART.fullmatch(path.name) and int(path.stem) not in keep
+            if stale or files.is_leftover(path.name):
                 path.unlink()
 
 
 def write_part(run: Path, task: int, parts: Mapping[str, bytes]) -> None:
-    """Store what a task sent back; `parts` are Parquet files by kind, that of `tasks` is written last."""
-    for kind in (*(k for k in parts if k != TASKS), TASKS):
-        folder = run / kind
-        folder.mkdir(parents=True, exist_ok=True)
-        write_durably(folder / f"{task:06d}.parquet", parts[kind])
+    """Store what a task sent back; `parts` are Parquet files by kind, that of `tasks` is written last.
+
+    Raises:
+        StoreError: The folder cannot be written; the task is flown again by `--resume`.
+    """
+    try:
+        for kind in (*(k for k in parts if k != TASKS), TASKS):
+            path = _part(run, kind, task)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            files.write(path, parts[kind])
+    except OSError as error:
+        raise StoreError(f"{run}: cannot be written: {files.reason(error)}; then continue with --resume") from error

@@ -1,12 +1,13 @@
 """Values of varied paths: as lists in a file, after `--vary a.b=x,y`, and as text in names and tables."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any, TypeGuard
 
 import numpy as np
 from pydantic import Field, ValidationError
 
-from ivl import native, yamlfile
+from ivl import native, references, yamlfile
 from ivl.errors import ConfigError
 from ivl.settings import Finite, Strict
 from ivl.task import Task
@@ -126,6 +127,8 @@ def apply_vary(data: dict[str, Any], vary: Sequence[str], label: str) -> None:
             raise ConfigError(f"{label}: --vary {text}: {name} is given twice")
         found = yamlfile.parse(f"[{rest}]", f"{label}: --vary {text}")
         given[name] = found[0] if len(found) == 1 and isinstance(found[0], (dict, list)) else found
+        if name in references.FIELDS and isinstance(given[name], list):
+            given[name] = [references.absolute(value, Path.cwd()) for value in given[name]]
         for same in (name, AXES[name]) if name in AXES else ():
             data.pop(same, None)
     if given:

@@ -3,9 +3,12 @@
 A worker needs this package and the native library, and nothing of the client's files: the world comes with the task.
 """
 
+import hashlib
 import os
 import pickle
 import platform
+import sys
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,16 +17,19 @@ from functools import cache
 import pyarrow as pa  # type: ignore[import-untyped]
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from ivl import native
+from ivl import native, numerics
 from ivl.errors import NativeError
 from ivl.sweep import policymap, schema, tables, trials
 from ivl.sweep.config import PolicyMap, Sweep
 from ivl.sweep.plan import DaskTask
+from ivl.sweep.store import INDEX_KEY, sealed
 from ivl.sweep.trials import Trial
 from ivl.sweep.vary import as_cell
 from ivl.world import World
 
 Tables = dict[str, pa.Table]
+LIMIT_S_MIN, SLOW_S_PER_ROLLOUT = 600.0, 0.1
+_POINTS_MAX = 1000  # points of a map's cell, as far as its limit of time is concerned
 
 
 @dataclass(frozen=True)
@@ -49,15 +55,41 @@ class Done:
     worker: str
 
 
-def run_packed(grid: Sweep | PolicyMap, packed_world: bytes, task: DaskTask, library_sha256: str) -> Done:
+def run_packed(
+    grid: Sweep | PolicyMap, packed_world: bytes, task: DaskTask, library_sha256: str, kernel: str, limit_s: float
+) -> Done:
     """`run_task` on a worker, with the world pickled: it cannot be unpacked by another native library.
 
+    A task that takes longer than `limit_s` ends its worker, since native code cannot be interrupted otherwise.
+
     Raises:
-        NativeError: This worker has another native library than the client, so that its bits would differ.
+        NativeError: This worker computes otherwise than the client, so that its bits would differ.
     """
     if _library_sha256() != library_sha256:
         raise NativeError(f"{native.library().path}: this worker's native library is not that of the client")
-    return run_task(grid, pickle.loads(packed_world), task)
+    if numerics.kernel() != kernel:
+        raise NativeError(
+            f"this worker computes with {numerics.kernel()}, the client with {kernel}: results would differ in their "
+            f"last bits ({numerics.ADVICE})"
+        )
+    watchdog = threading.Timer(limit_s, _give_up, (task.number, limit_s))
+    watchdog.daemon = True
+    watchdog.start()
+    try:
+        return run_task(grid, pickle.loads(packed_world), task)
+    finally:
+        watchdog.cancel()
+
+
+def limit_s(grid: Sweep | PolicyMap, task: DaskTask) -> float:
+    """How long a task may take: a hundred times what it takes on a slow processor, and not less than ten minutes."""
+    n_each = grid.budget + grid.check_rollouts if isinstance(grid, Sweep) else grid.n_rollouts * _POINTS_MAX
+    return max(LIMIT_S_MIN, SLOW_S_PER_ROLLOUT * n_each * len(task.trials))
+
+
+def _give_up(number: int, limit_s: float) -> None:
+    print(f"task {number} takes longer than {limit_s:.0f} s: its worker ends", file=sys.stderr, flush=True)
+    os._exit(os.EX_TEMPFAIL)
 
 
 def run_task(grid: Sweep | PolicyMap, world: World, task: DaskTask) -> Done:
@@ -91,7 +123,7 @@ def lost(grid: Sweep | PolicyMap, task: DaskTask, error: Exception) -> Done:
 
 
 def record(task: DaskTask, done: Done) -> bytes:
-    """The row of the `tasks` table, as a Parquet file."""
+    """The row of the `tasks` table, as a Parquet file that vouches for the task's other parts."""
     columns = {
         "task": [task.number],
         "n_trials": [done.n_trials],
@@ -102,7 +134,9 @@ def record(task: DaskTask, done: Done) -> bytes:
         "result_bytes": [sum(len(part) for part in done.parts.values())],
         "worker": [done.worker],
     }
-    return tables.encode(tables.make_table(schema.TASKS, columns))
+    table = tables.make_table(schema.TASKS, columns)
+    index = {kind: hashlib.sha256(part).hexdigest() for kind, part in done.parts.items()}
+    return tables.encode(table.replace_schema_metadata({**table.schema.metadata, INDEX_KEY: sealed(table, index)}))
 
 
 def _with_varied(table: pa.Table, task: DaskTask) -> pa.Table:

@@ -82,7 +82,7 @@ def _draw(library: Any, result: Any, home: World, path: Path) -> None:
 
 def _report(summary: dict[str, Any], name: str) -> None:
     def line(label: str, text: str) -> None:
-        console.out.print(f"{label:34s} {text}", highlight=False, markup=False, soft_wrap=True)
+        console.out.print(f"{label:34s} {text}")
 
     line("vehicle", name)
     line("flights compared", str(summary["n_flights"]))

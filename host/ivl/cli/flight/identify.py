@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-import yaml
 from rich.table import Table
 
+from ivl import files, yamlfile
 from ivl.cli import console
 from ivl.cli.flight import options
 from ivl.cli.task_options import Chosen
@@ -99,16 +99,15 @@ def _number(text: str) -> float:
 
 
 def _source(flights: Any, result: Any) -> str:
-    files = ", ".join(str(item["file"]).rpartition("/")[2] for item in flights.manifest.source)
-    return f"identified from the motion of {len(result.used)} recorded flights ({files}) by ivl flight identify"
+    names = ", ".join(str(item["file"]).rpartition("/")[2] for item in flights.manifest.source)
+    return f"identified from the motion of {len(result.used)} recorded flights ({names}) by ivl flight identify"
 
 
 def _write(path: Path, content: dict[str, Any]) -> None:
-    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=10_000, default_flow_style=None)
     try:
-        path.write_text(text, encoding="utf-8")
+        files.write(path, yamlfile.dump(content, width=10_000, flow=None))
     except OSError as error:
-        raise ConfigError(f"--out {path}: cannot be written: {error}") from error
+        raise ConfigError(f"--out {path}: cannot be written: {files.reason(error)}") from error
 
 
 def _report(summary: dict[str, Any]) -> None:
@@ -118,22 +117,22 @@ def _report(summary: dict[str, Any]) -> None:
     for name, one in summary["parameters"].items():
         low, high = one["interval_95"]
         table.add_row(name, f"{one['value']:.5g}", f"{low:.4g} to {high:.4g}", f"{one['prior']:.5g}", one["unit"])
-    console.out.print(table)
+    console.out.print(table, soft_wrap=False)
     names = list(summary["parameters"])
     if len(names) > 1:
-        console.out.print("correlation", highlight=False)
+        console.out.print("correlation")
         for name, row in zip(names, summary["correlation"], strict=True):
             values = " ".join(f"{value:6.2f}" for value in row)
-            console.out.print(f"  {name:28s} {values}", highlight=False, markup=False)
+            console.out.print(f"  {name:28s} {values}")
     for label, part in (("fitted", "fitted"), ("held out", "held_out")):
         before, after = summary["before"][part], summary["after"][part]
         if before is not None:
             text = f"pitch {before['pitch_rms_deg']:.1f} deg before, {after['pitch_rms_deg']:.1f} deg after"
-            console.out.print(f"{label} flights: {text}", highlight=False)
+            console.out.print(f"{label} flights: {text}")
     error = 100.0 * summary["rotor_error"]
     text = f"rotor speeds at the trigger, fitted along: {error:+.2f} % (not part of the vehicle)"
-    console.out.print(text, highlight=False)
+    console.out.print(text)
     for text in summary["left_out"]:
-        console.out.print(f"left out: {text}", highlight=False, markup=False, soft_wrap=True)
+        console.out.print(f"left out: {text}")
     for word in summary["words"]:
-        console.out.print(word, highlight=False, soft_wrap=True)
+        console.out.print(word)

@@ -72,13 +72,13 @@ def import_(
     counts = {"flights": len(flights), "usable": len(flights.usable()), "samples": sum(len(f) for f in flights)}
     for note in flights.manifest.notes:
         if note.startswith("WARNING"):
-            console.err.print(note, style="yellow", highlight=False, markup=False, soft_wrap=True)
+            console.err.print(note, style="yellow")
     if as_json:
         console.print_json({"folder": str(out), **counts, "notes": list(flights.manifest.notes)})
         return
     flown = "1 flight" if len(flights) == 1 else f"{len(flights)} flights"
     text = f"{out}: {flown}, {counts['usable']} usable, {counts['samples']} samples"
-    console.out.print(text, highlight=False, markup=False, soft_wrap=True)
+    console.out.print(text)
 
 
 def _outcomes(text: str) -> list[int | None]:

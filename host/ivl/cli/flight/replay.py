@@ -85,13 +85,12 @@ def _report(result: "Result") -> None:
     console.out.print(
         f"{summary['n_flights']} flights, {summary['n_samples']} samples of approaches, {summary['n_ticks']} ticks "
         f"({summary['where']})",
-        highlight=False,
     )
-    console.out.print(_table(summary))
+    console.out.print(_table(summary), soft_wrap=False)
     for label, reason in result.left_out:
-        console.out.print(f"Left out: {label}: {reason}", highlight=False, markup=False, soft_wrap=True)
+        console.out.print(f"Left out: {label}: {reason}")
     for sentence in result.verdict():
-        console.out.print(sentence, highlight=False, markup=False, soft_wrap=True)
+        console.out.print(sentence)
 
 
 def _table(summary: dict[str, Any]) -> Table:

@@ -40,12 +40,12 @@ def show(
         return
     for source, group in groupby(rows, key=lambda row: str(row["source"])):
         if len(manifest.source) > 1:
-            console.out.print(source, highlight=False, markup=False)
-        console.out.print(_table(list(group)))
+            console.out.print(source)
+        console.out.print(_table(list(group)), soft_wrap=False)
     for row in rows:
         text = ("" if row["usable"] else "NOT USABLE: ") + row["note"]
         if text:
-            console.out.print(f"{row['label']}: {text}", highlight=False, markup=False)
+            console.out.print(f"{row['label']}: {text}")
     usable = flights.usable()
     judged = [int(f.info["n_legs"]) for f in usable if math.isfinite(f.info["n_legs"])]
     outcomes = ", ".join(f"{judged.count(n)} on {n}" for n in sorted(set(judged), reverse=True)) or "none judged"
@@ -59,9 +59,9 @@ def show(
         "absent": ", ".join(manifest.absent) or "nothing",
     }
     for name, text in facts.items():
-        console.out.print(f"{name + ':':9s}{text}", highlight=False, markup=False)
+        console.out.print(f"{name + ':':9s}{text}")
     for note in manifest.notes:
-        console.out.print(f"note:    {note}", highlight=False, markup=False)
+        console.out.print(f"note:    {note}")
 
 
 def _row(info: Any, n: int, duration_s: float) -> dict[str, Any]:

@@ -20,7 +20,8 @@ box (1.5 to 3.5 m/s, 30 to 90 degrees) and plane (0.25 to 4 m/s, 20 to 90 degree
 flown; shaped: the plane, flown by an approach that first leads into the region where landings are possible; go: on the
 plane, how well the estimated probability tells landings from failures, and what the policy's own go / no-go does.
 
-It is flown on what it was learned on, changed by the options.
+It is flown on what it was learned on, changed by the options. A policy that was learned over drawn vehicles is flown
+by the vehicles of the files, too, unless --family draws others.
 
 \b
 Examples:
@@ -35,7 +36,7 @@ Examples:
 """
 
 
-@task_options(*EQUIPMENT, "start")
+@task_options(*EQUIPMENT, "start", kind=PolicyTask, otherwise="as it was learned")
 def assess(
     chosen: Chosen,
     path: Annotated[Path, typer.Argument(metavar="FILE", help="Policy file.")],
@@ -51,8 +52,7 @@ def assess(
     policy = file.load(path)
     different: list[PolicyTask] = []
     for learned_on in policy.tasks:
-        data = {name: value for name, value in chosen.fields(learned_on).items() if name in PolicyTask.model_fields}
-        task = yamlfile.validate(PolicyTask, data, "options")
+        task = yamlfile.validate(PolicyTask, chosen.fields(learned_on), "options")
         if task not in different:
             different.append(task)
     drawn = Drawn(n_vehicles=family, seed=seed) if family is not None else None
@@ -64,6 +64,7 @@ def assess(
 
 
 def _print(found: Assessment) -> None:
+    _line("vehicles", str(found.vehicles))
     for name, rates in (("box", found.box), ("plane", found.plane), ("plane, shaped approach", found.shaped)):
         _line(name, _rates(rates) if rates else "this flight core has no such approach")
     go = found.go
@@ -77,7 +78,8 @@ def _print(found: Assessment) -> None:
     _line("refused although they would land", _share(go.refused_good))
     _line("body strikes avoided", _share(go.strikes_avoided))
     _line("landings among those flown", _share(go.landed_of_flown))
-    _line("contacts of refused flights", str(go.level_out_contacts))
+    _line("contacts in level-outs", str(go.level_out_contacts))
+    _line("contacts before the refusal", str(go.contacts_before))
 
 
 def _rates(rates: Rates) -> str:

@@ -71,7 +71,11 @@ def learn(
     if as_json:
         console.print_json({"policy": str(out), **learned.model_dump(mode="json")})
     else:
-        rates = f"{console.percent(score.landed)} land, {console.percent(score.clean)} clean" if score else "not known"
+        rates, own = "not known", "it refuses nothing"
+        if score is not None:
+            rates = f"{console.percent(score.landed)} land, {console.percent(score.clean)} clean, every one flown"
+        if score is not None and score.with_go is not None:
+            own = f"{console.percent(score.with_go.refused)} are refused, {console.percent(score.with_go.landed)} land"
         for name, text in (
             ("form", f"{learned.form}, {learned.shape.n} numbers"),
             ("flights", str(training.rollouts)),
@@ -79,6 +83,7 @@ def learn(
             ("objective of the policy", console.number(training.objective, 4)),
             ("over the approaches that chose it", rates),
             ("go / no-go", f"no flip below a probability of {learned.theta['go_p_min'].value:g}"),
+            ("the same with go / no-go", own),
             ("policy", str(out)),
         ):
             console.out.print(f"{name:36s} {text}", highlight=False, soft_wrap=True)

@@ -7,11 +7,12 @@ import numpy as np
 import typer
 from rich.table import Table
 
+from ivl import native
 from ivl.cli import console, policy_options
 from ivl.cli.policy import survey_options
 from ivl.errors import ConfigError
 from ivl.policy import file
-from ivl.policy.file import PolicyFile
+from ivl.policy.file import NONE, PolicyFile, Score, Training, WithGo
 from ivl.policy.shape import General, is_general
 from ivl.policy.survey import survey
 
@@ -63,7 +64,7 @@ def show(
         constant, n = survey_options.constant_of(rrev, moment), approaches or survey_options.N_APPROACHES
         _draw_all(policy, plot, n, seed, constant, threads)
     if as_json:
-        console.print_json({**policy.model_dump(mode="json"), "crc": policy.crc, "table": _table(policy)})
+        console.print_json({**policy.model_dump(mode="json"), "crc": f"{policy.checksum:08x}", "table": _table(policy)})
     else:
         _print(policy)
 
@@ -114,7 +115,19 @@ def _print(policy: PolicyFile) -> None:
     _line("form", f"{form.name}: {form.doc}")
     for p, value in zip(form.params, policy.values, strict=True):
         _line(f"  {p.name}", f"{value:.6g} {p.unit}")
-    _line("checksum on a vehicle", f"{policy.crc:08x}")
+    _print_origin(policy)
+    found = _table(policy)
+    if found is not None:
+        _print_table(found)
+
+
+def _print_origin(policy: PolicyFile) -> None:
+    """Where the numbers come from, and how good they were found to be."""
+    _line("checksum on a vehicle", f"{policy.checksum:08x}")
+    if policy.digest == NONE:
+        _line("digest", "none: written or changed by hand, so that origin and score need not be those of the numbers")
+    elif policy.made_by != native.library().digest():
+        _line("made by", "another version of the simulator, in which landing rates may differ")
     for task in policy.tasks:
         told = task.model_dump(mode="json", exclude_defaults=True)
         overrides = {name: setting["value"] for name, setting in told.pop("overrides", {}).items()}
@@ -122,21 +135,32 @@ def _print(policy: PolicyFile) -> None:
             told["family"] = "with a section of its own"
         _line("learned on", ", ".join(f"{name} {value}" for name, value in {**told, **overrides}.items()))
     if policy.training is not None:
-        t = policy.training
-        _line("learned by", f"{t.learner.name}, seed {t.seed}, {t.rollouts} flights{', interrupted' * t.interrupted}")
-        for region in t.regions:
-            (v0, v1), (a0, a1) = region.speeds_mps, region.angles_deg
-            _line("approaches", f"{v0:g} to {v1:g} m/s, {a0:g} to {a1:g} degrees")
-        _line(
-            "objective",
-            f"{console.number(t.objective, 4)} (at the start {console.number(t.start_objective, 4)})",
-        )
+        _print_training(policy.training)
     if policy.score is not None:
-        s = policy.score
-        _line("score", f"{console.percent(s.landed)} land, {console.percent(s.clean)} clean, of {s.flights} flights")
-    found = _table(policy)
-    if found is None:
-        return
+        _print_score(policy.score)
+
+
+def _print_training(t: Training) -> None:
+    _line("learned by", f"{t.learner.name}, seed {t.seed}, {t.rollouts} flights{', interrupted' * t.interrupted}")
+    if t.family is not None:
+        _line("learned over", f"{t.family.n_vehicles} vehicles drawn in place of each (seed {t.family.seed})")
+    for region in t.regions:
+        (v0, v1), (a0, a1) = region.speeds_mps, region.angles_deg
+        _line("approaches", f"{v0:g} to {v1:g} m/s, {a0:g} to {a1:g} degrees")
+    _line("objective", f"{console.number(t.objective, 4)} (at the start {console.number(t.start_objective, 4)})")
+
+
+def _print_score(s: Score) -> None:
+    _line("score", f"{_rates(s)}, of {s.flights} approaches, {'every one flown' if s.with_go else 'none refused'}")
+    if s.with_go is not None:
+        _line("with go / no-go", f"{console.percent(s.with_go.refused)} of them are refused, {_rates(s.with_go)}")
+
+
+def _rates(of: Score | WithGo) -> str:
+    return f"{console.percent(of.landed)} land, {console.percent(of.clean)} clean"
+
+
+def _print_table(found: dict[str, Any]) -> None:
     for name, title, digits in (
         ("threshold_per_s", "R* (1/s) over v_x (m/s, to the right) and v_z (m/s, down)", 2),
         ("p_land", "probability of a landing", 2),
@@ -148,7 +172,7 @@ def _print(policy: PolicyFile) -> None:
         for vz, row in zip(found["vz_mps"], found[name], strict=True):
             table.add_row(f"{vz:g}", *(f"{value:.{digits}f}" for value in row))
         console.out.print()
-        console.out.print(table)
+        console.out.print(table, soft_wrap=False)
 
 
 def _line(name: str, text: str) -> None:

@@ -99,7 +99,7 @@ def _database(folder: Path) -> dict[str, dict[str, Any]]:
     result: dict[str, dict[str, Any]] = {}
     try:
         experiment, n_trials = run.read_config(folder)
-        with RunStore.open_existing(folder, native.library().outcome_dtype) as store:
+        with RunStore.open_reading(folder, native.library().outcome_dtype) as store:
             rollouts = [store.rollouts(trial=trial) for trial in range(n_trials or 1)]
         record, _ = experiment.make_world().native_model.config()
     except (IvlError, sqlite3.Error) as error:

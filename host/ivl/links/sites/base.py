@@ -76,7 +76,7 @@ class Site(Protocol):
         ...
 
     def leave(self) -> None:
-        """Bring the vehicle down and leave it as it was found; what fails is told, not raised."""
+        """Bring the vehicle down and leave it as it was found; a failure is reported, not raised."""
         ...
 
     # ---- a landing
@@ -97,7 +97,7 @@ class Site(Protocol):
         """What people are told of a landing that counts; empty: nothing."""
         ...
 
-    # ---- recovery, each told and not raised
+    # ---- recovery, whose failures are reported, not raised
 
     def after_refusal(self) -> None:
         """The vehicle has refused a policy before its approach, and is asked for the next one."""
@@ -109,7 +109,7 @@ class Site(Protocol):
 
 
 def give_back_time(clock: Clock, say: Callable[[str], None]) -> None:
-    """Let a vehicle's time pass again, or it would stand still for whoever comes next; a failure is told."""
+    """Let a vehicle's time pass again, or it would stand still for whoever comes next; a failure is reported."""
     try:
         clock.close()
     except LinkError as error:

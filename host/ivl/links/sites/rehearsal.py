@@ -18,7 +18,7 @@ class Rehearsal(Room):
 
     @staticmethod
     def make_clock(session: Session, visit: Visit) -> Clock:
-        """Lock-step, at the pace that a drone is commanded at; but cameras have a time of their own."""
+        """Lock-step at the pace of a drone's commands, unless cameras with a time of their own follow the vehicle."""
         return LockStep(session, FINE) if visit.tracking is None else WallClock()
 
     def make_ready(self, again: bool) -> None:

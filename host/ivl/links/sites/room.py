@@ -24,6 +24,7 @@ from ivl.links.sites.base import Visit, give_back_time
 from ivl.links.tables import Session
 from ivl.links.truth import Resting, note_no_go, outcome_of_flight, suggest_legs
 from ivl.links.vehicle import Command, Supervisor, Vehicle
+from ivl.outcome import verdict
 
 CLIMB_MPS, TRAVEL_MPS = 0.5, 0.5
 NEAR_M = 0.1
@@ -69,10 +70,10 @@ class Room:
         return preflight.checks(self._vehicle)
 
     def prove(self, fly: Callable[[Rollout], Outcome]) -> None:
-        """Nothing: nobody knows what must come of a landing."""
+        """Do nothing: nobody knows what must come of a landing."""
 
     def leave(self) -> None:
-        """Down and disarmed; what was done is told."""
+        """Bring the vehicle down and disarm it, and say what was done."""
         self._come_down()
         give_back_time(self._vehicle.clock, self._say)
 
@@ -82,11 +83,11 @@ class Room:
     # ---- recovery
 
     def after_refusal(self) -> None:
-        """Down: the next policy is flown from the floor."""
+        """Bring the vehicle down: the next policy is flown from the floor."""
         self._come_down()
 
     def after_fault(self) -> None:
-        """Down first; then a new connection, to be sure."""
+        """Bring the vehicle down; a new connection follows, to be sure."""
         self._come_down()
 
     # ---- a landing
@@ -152,15 +153,17 @@ class Room:
         """Wait until the motors are off for good, read the recorder, and let the operator confirm what is seen."""
         vehicle = self._vehicle
         vehicle.wait(self._is_over, _END_S, "end of the landing")
-        called_off = end_level_out(vehicle) if vehicle.phase == Phase.LEVEL_OUT else None
-        if called_off is None:
-            vehicle.wait(self._is_over, _END_S, "end of the landing")  # of one that aborted while it levelled out
+        level_out = None
+        if vehicle.phase == Phase.LEVEL_OUT:
+            level_out = end_level_out(vehicle, self._world.surface)
+            if vehicle.aborted_by:
+                vehicle.wait(self._is_over, _END_S, "landing after an abort in the level-out")
         vehicle.pause(_SETTLE_S)
         self._restore_tumble_check()
-        aborted = vehicle.phase == Phase.ABORTED
-        why = vehicle.aborted_by
+        aborted, called_off = vehicle.phase == Phase.ABORTED, vehicle.was_called_off()
+        why = f"aborted: {vehicle.aborted_by}" if aborted else ""
         check_abort(vehicle)
-        decision = vehicle.decision() if called_off is None else (called_off.p_land, called_off.d_decided_m)
+        decision = level_out.decision if level_out else vehicle.decision()
         if aborted:
             # it stands upright, and the planner still has the start point: with IDLE its controller flies again
             vehicle.stop_planner()
@@ -169,20 +172,20 @@ class Room:
         seen_at = self._tracking.resting() if self._tracking is not None else None
         resting = seen_at or resting_by_estimate(vehicle, recording)
         suggested = operators.Seen(0 if aborted else suggest_legs(resting, self._world), body_contact=False)
-        note = f"aborted: {why}" if aborted else "called off by the policy" if called_off is not None else ""
+        note = ", ".join(filter(None, ("called off by the policy" if called_off else "", why)))
         seen = self._operator.confirm(suggested, resting, note)
         if seen.discard:
-            raise RolloutError(f"discarded by the operator{f' (aborted: {why})' if aborted else ''}")
+            raise RolloutError(f"discarded by the operator{f' ({why})' if why else ''}")
         outcome = outcome_of_flight(recording, vehicle.snapshot(), seen.n_legs, seen.body_contact, resting, self._world)
         outcome["p_land"], outcome["d_decided_m"] = decision
         outcome["decided"] = int(math.isfinite(decision[0]))
-        if called_off is not None:
-            note_no_go(outcome, called_off, self._world)
+        if called_off:
+            note_no_go(outcome, level_out.nearest_m if level_out else math.inf, aborted)
         return outcome, recording
 
     def told(self, landing: Landing) -> str:
-        """What the operator has confirmed, and the battery that the landing began with."""
-        return f"flown: {int(landing.outcome['n_legs'][0])} legs hold, battery {landing.battery_V:.2f} V"
+        """How it ended, as the operator has confirmed it, and the battery that the landing began with."""
+        return f"flown: {verdict(landing.outcome[0])}, battery {landing.battery_V:.2f} V"
 
     def _is_over(self) -> bool:
         vehicle = self._vehicle

@@ -36,7 +36,7 @@ class Simulator:
 
     @staticmethod
     def make_clock(session: Session, visit: Visit) -> Clock:
-        """Lock-step; but cameras have a time of their own."""
+        """Lock-step, unless cameras follow the vehicle, which have a time of their own."""
         return LockStep(session, COARSE) if visit.tracking is None else WallClock()
 
     # ---- connection
@@ -81,7 +81,7 @@ class Simulator:
         visit.warn(text)
 
     def leave(self) -> None:
-        """Down, the extras off, and time passes again."""
+        """Bring the vehicle down, end the extras of the simulator, and let time pass again."""
         safe_or_why(self._vehicle)
         try:
             self._extras.close()
@@ -98,10 +98,10 @@ class Simulator:
         return self._extras.reset(spec)
 
     def before_approach(self, rollout: Rollout) -> None:
-        """Nothing: the start has been told with the reset."""
+        """Do nothing: the reset has said where the landing begins."""
 
     def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
-        """The simulator's truth; the recording only if it is wanted."""
+        """Return what the simulator knows, and the recording if it is wanted."""
         vehicle = self._vehicle
         outcome = self._extras.wait_for_outcome(policy_seq)
         if vehicle.phase == Phase.LEVEL_OUT:  # called off, and hovers: taken over, as a drone would be
@@ -113,14 +113,14 @@ class Simulator:
         return outcome, vehicle.recording(policy_seq)
 
     def told(self, landing: Landing) -> str:
-        """Nothing: it would be many lines a second."""
+        """Say nothing: it would be many lines a second."""
         del landing
         return ""
 
     # ---- recovery
 
     def after_refusal(self) -> None:
-        """Nothing: the next landing begins with a reset."""
+        """Do nothing: the next landing begins with a reset."""
 
     def after_fault(self) -> None:
         """Time passes again, since there may be no other attempt; the next connection begins with a reset."""
