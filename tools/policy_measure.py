@@ -22,7 +22,7 @@ from ivl.outcome import clean, four_leg
 from ivl.policy import assess, file, general, learn
 from ivl.policy.assess import Assessment
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Family, Place, PolicyTask, fly, fly_own
+from ivl.policy.flying import Drawn, Place, PolicyTask, fly, fly_own
 from ivl.policy.flying import score as score_of
 from ivl.policy.region import BOX, PLANE, Approaches, Series
 from ivl.policy.shape import General, is_general
@@ -274,14 +274,14 @@ def family(bench: Bench) -> Data:
     found: Data = {}
     for gear in ("wide_long",):
         begin = bench.learned(*LONG, *FLOWN, f"gear={gear}")
-        over_drawn = (f"family.n_vehicles={N_FAMILY}", "family.seed=1")
+        over_drawn = (f"drawn.n_vehicles={N_FAMILY}", "drawn.seed=1")
         policies = {
             "nominal": bench.learned(*FAMILY_ON, *FLOWN, f"gear={gear}", *_shared_by(1), start=begin),
             "family": bench.learned(
                 *FAMILY_ON, *FLOWN, f"gear={gear}", *over_drawn, *_shared_by(N_FAMILY), start=begin
             ),
         }  # fmt: skip
-        drawn = Family(n_vehicles=N_DRAWN, seed=SEED)
+        drawn = Drawn(n_vehicles=N_DRAWN, seed=SEED)
         places = Place.of(begin.tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
         batches = Series([BOX], SEED, Purpose.ASSESS).for_each(len(places), N_EACH)
         row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY}

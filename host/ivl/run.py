@@ -112,7 +112,7 @@ def run(
     packed, copies = references.pack(chosen)
     manifest = make_manifest(packed, world, n_trials, uri)
     with ExitStack() as stack:
-        simulator, notes = _simulator(chosen, world, threads, hooks)
+        simulator, notes = _simulator(chosen, threads, hooks)
         source = _open_source(uri, chosen, world, threads, folder, flight, simulator is not None)
         stack.callback(source.close)
         store = stack.enter_context(_open(folder, packed, copies, manifest, resume))
@@ -151,7 +151,7 @@ def _open_source(
 
 
 def _simulator(
-    chosen: Experiment, world: World, threads: int | None, hooks: Hooks
+    chosen: Experiment, threads: int | None, hooks: Hooks
 ) -> tuple[Simulator | None, list[str]]:
     """Simulated vehicles for a learner that begins with them, and why there are none."""
     if not LEARNERS[chosen.learner.name].cls.uses_simulator:
@@ -159,7 +159,7 @@ def _simulator(
     if chosen.policy.form != forms.PAPER:
         return None, [f"learned from flights alone: a belief knows policies of the form {forms.PAPER}"]
     try:
-        kin = family.of(world)
+        kin = family.of(chosen.nominal_world_of(chosen.gear), chosen.family)
     except ConfigError as error:
         return None, [f"learned from flights alone: {error}"]
     return Simulator.of(kin, chosen.flight, threads=threads, progress=hooks.on_bank), []

@@ -114,7 +114,7 @@ def put(data: dict[str, Any], path: str, value: Any, source: str, label: str) ->
         setting = {"value": _checked(path, value, label), "unit": parameter.unit, "source": source}
         data["overrides"] = {**(data.get("overrides") or {}), path: setting}
         return
-    *parents, last = path.split(".")
+    *parents, last = _keys(path)
     for key in parents:
         data[key] = {} if data.get(key) is None else data[key]
         if not isinstance(data[key], dict):
@@ -124,6 +124,17 @@ def put(data: dict[str, Any], path: str, value: Any, source: str, label: str) ->
     if parents and last == "name" and data.get(last) != value:
         data.pop("options", None)  # they belong to the reward or learner of the old name
     data[last] = value
+
+
+def _keys(path: str) -> list[str]:
+    """The keys of a path; the dotted name of a parameter within it is one key, as in `family.parameters.body.mass`."""
+    keys: list[str] = []
+    for part in path.split("."):
+        if keys and f"{keys[-1]}.{part}" in native.library().params:
+            keys[-1] += f".{part}"
+        else:
+            keys.append(part)
+    return keys
 
 
 def _checked(name: str, value: Any, label: str) -> float:

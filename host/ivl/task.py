@@ -15,6 +15,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from ivl import model, native
+from ivl.errors import ConfigError
+from ivl.family import FamilyChoice, chosen_member
 from ivl.sensing import APPROACHES, ESTIMATORS, approach_settings, estimator_settings
 from ivl.settings import Finite, Setting, Strict
 from ivl.world import World
@@ -52,6 +54,9 @@ class Setup(Strict):
         default="imparted", description="At the approach velocity, from hover, or at the trigger."
     )
     overrides: dict[str, Setting] = Field(default_factory=dict, description="Parameters of the world that differ.")
+    family: FamilyChoice = Field(
+        default=FamilyChoice(), description="What is uncertain of all that, beside the sigma of the files."
+    )
 
     @model_validator(mode="after")
     def _one_word_for_each(self) -> Self:
@@ -65,13 +70,25 @@ class Setup(Strict):
                 raise ValueError(f"overrides.{name}: {override.value:g} contradicts {said_by}, which says {value:g}")
         return self
 
+    @model_validator(mode="after")
+    def _family_is_possible(self) -> Self:
+        try:
+            self.family.check()
+        except ConfigError as error:
+            raise ValueError(str(error)) from error
+        return self
+
     def world_settings(self) -> dict[str, float]:
         """World parameters that differ from what vehicle, gear and sensor set say."""
         overrides = {name: setting.value for name, setting in self.overrides.items()}
         return {**approach_settings(self.approach), **estimator_settings(self.estimator), **overrides}
 
     def world_of(self, gear: str) -> World:
-        """The world of this set-up with one landing gear."""
+        """The world of this set-up with one landing gear; that of a member if the family names one."""
+        return chosen_member(self.nominal_world_of(gear), self.family)
+
+    def nominal_world_of(self, gear: str) -> World:
+        """The world of the files and overrides, whichever member flies."""
         return World(self.vehicle, gear, self.gear_set, self.sensing, **self.world_settings())
 
     def setup(self) -> dict[str, Any]:

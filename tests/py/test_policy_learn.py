@@ -18,7 +18,7 @@ from ivl.outcome import clean, four_leg
 from ivl.policy import assess as judging
 from ivl.policy import file, general, use
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Family, Place, PolicyTask, fly
+from ivl.policy.flying import Drawn, Place, PolicyTask, fly
 from ivl.policy.learn import Progress, learn
 from ivl.policy.region import PLANE, Region, Series
 from ivl.policy.shape import GO, General
@@ -135,12 +135,12 @@ def test_a_family_takes_the_place_of_each_task_s_vehicle() -> None:
     task = {"vehicle": "crazyflie21", "gear": "wide_long", "gear_set": "table1", "estimator": "known_height_predicted"}
     drawn = {"n_vehicles": 3, "seed": 1}
     regions = [{"speeds_mps": [3.0, 3.5], "angles_deg": [75.0, 90.0]}]
-    found = learn(tiny_experiment(tasks=[task], family=drawn, regions=regions))
+    found = learn(tiny_experiment(tasks=[task], drawn=drawn, regions=regions))
     assert found.training is not None
     assert found.score is not None
-    assert found.training.family == Family(n_vehicles=3, seed=1)
+    assert found.training.family == Drawn(n_vehicles=3, seed=1)
     assert found.score.flights == 3 * 60
-    members = Place.of(found.tasks[0]).members(Family(n_vehicles=3, seed=1), Purpose.FAMILY)
+    members = Place.of(found.tasks[0]).members(Drawn(n_vehicles=3, seed=1), Purpose.FAMILY)
     # each vehicle has approaches of its own, which are many together
     approaches = Series([Region.model_validate(regions[0])], 0, Purpose.SELECT).for_each(3, 60)
     assert len(set(np.concatenate([batch.stream for batch in approaches]))) == 3 * 60
@@ -166,16 +166,16 @@ def test_vehicles_do_not_share_their_approaches(monkeypatch: pytest.MonkeyPatch)
     for module in ("search", "learn", "go"):
         monkeypatch.setattr(f"ivl.policy.{module}.fly", spy)
     regions = [{"speeds_mps": [3.0, 3.5], "angles_deg": [75.0, 90.0]}]
-    learn(tiny_experiment(tasks=[task], family={"n_vehicles": 3}, regions=regions))
+    learn(tiny_experiment(tasks=[task], drawn={"n_vehicles": 3}, regions=regions))
     assert set(flown) == {3}
     assert len(met) > 3 * (3 * 8 + 60 + 200 + 100)
 
 
 def test_a_family_of_a_vehicle_without_sigmas_is_said() -> None:
     with pytest.raises(ConfigError, match="family: vehicle habas2021, gear as_simulated/wide_short: no parameter has"):
-        learn(tiny_experiment(family={"n_vehicles": 2}))
-    with pytest.raises(ConfigError, match=r"family\.n_vehicles: value 0"):
-        tiny_experiment(family={"n_vehicles": 0})
+        learn(tiny_experiment(drawn={"n_vehicles": 2}))
+    with pytest.raises(ConfigError, match=r"drawn\.n_vehicles: value 0"):
+        tiny_experiment(drawn={"n_vehicles": 0})
 
 
 def test_an_interruption_keeps_the_best_so_far() -> None:
@@ -394,7 +394,7 @@ def test_an_assessment_is_repeatable_and_of_fresh_approaches(by_hand: PolicyFile
 
 def test_an_assessment_of_a_family_counts_its_vehicles(by_hand: PolicyFile) -> None:
     task = TASK.model_copy(update={"vehicle": "crazyflie21", "gear": "wide_long", "gear_set": "table1"})
-    drawn = Family(n_vehicles=11, seed=5)
+    drawn = Drawn(n_vehicles=11, seed=5)
     found = judging.assess(by_hand, [task], 40, 5, family=drawn)
     members = Place.of(task).members(drawn, Purpose.FAMILY_ASSESS)
     learned_on = Place.of(task).members(drawn, Purpose.FAMILY)
@@ -623,7 +623,7 @@ def test_the_help_of_an_assessment_says_what_is_flown_unless_told(capsys: Captur
 
 def test_an_assessment_says_which_vehicles_fly(learned: PolicyFile) -> None:
     assert learned.training is not None
-    over = learned.training.model_copy(update={"family": Family(n_vehicles=6, seed=1)})
+    over = learned.training.model_copy(update={"family": Drawn(n_vehicles=6, seed=1)})
     family = file.make(learned.shape, learned.values, learned.tasks, over, learned.score)
     found = judging.assess(family, n_approaches=20)
     assert str(found.vehicles) == "those of the files; the policy was learned over 6 drawn ones (seed 1)"

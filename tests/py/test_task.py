@@ -48,7 +48,7 @@ def test_every_field_of_the_task_reaches_the_world_or_the_rollout() -> None:
     digests |= {task.model_copy(update={name: value}).make_world().params.digest() for name, value in changes.items()}
     assert len(digests) == 1 + len(changes)
     rest = set(Task.model_fields) - set(changes)
-    assert rest == {"speed_mps", "angle_deg", "start", "overrides"}
+    assert rest == {"speed_mps", "angle_deg", "start", "overrides", "family"}
 
 
 def test_a_landing_of_a_run_has_all_of_its_task() -> None:
@@ -114,7 +114,7 @@ def test_one_set_of_landing_gears_is_the_default_of_every_command(capsys: Captur
 
 
 def test_every_field_of_the_task_has_an_option_and_a_text() -> None:
-    assert set(FLAGS) == set(Task.model_fields) - {"overrides"}
+    assert set(FLAGS) == set(Task.model_fields) - {"overrides", "family"}
     assert all(Task.model_fields[name].description for name in FLAGS)
     assert set(Setup.model_fields) < set(Task.model_fields)
 

@@ -177,3 +177,9 @@ def student95(freedom: float) -> float:
         (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
     )
     return sum(term / freedom**i for i, term in enumerate(terms))
+
+
+def worst_tenth(rates: npt.ArrayLike) -> float:
+    """Mean over the tenth of the vehicles with the lowest rates, over one at least; rates of shape (n,)."""
+    rising = np.sort(np.asarray(rates, dtype=np.float64))
+    return float(rising[: -(-rising.size // 10)].mean())

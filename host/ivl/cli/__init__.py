@@ -19,6 +19,7 @@ from ivl.cli import (
     doctor,
     estimate,
     export,
+    family,
     figs,
     flash,
     flight,
@@ -59,6 +60,7 @@ app.command("can-gateway", help=can_gateway.HELP, short_help="Carry the link of 
     can_gateway.can_gateway
 )
 app.command("flash", help=flash.HELP)(flash.flash)
+app.add_typer(family.app, name="family", short_help="Show the vehicles that a task may be flown with.")
 app.add_typer(policy.app, name="policy", short_help="Learn, show and judge policies for every approach.")
 app.add_typer(flight.app, name="flight", short_help="Import, replay, compare and identify recorded flights.")
 

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressC
 
 from ivl import references, run
 from ivl.cli import console, policy_options
+from ivl.family import MEMBER
 from ivl.policy import use
 
 HELP = """Learn over a grid of approaches and landing gears: run a sweep FILE.
@@ -34,6 +35,8 @@ Examples:
       one landing gear, three latencies
   ivl sweep sweeps/smoke.yaml --policy g.yaml --set start=flown --set estimator=known_height_predicted
       a policy for every approach, as it is, over the grid: landing rates without learning
+  ivl sweep sweeps/smoke.yaml --set vehicle=crazyflie21 --set gear_set=table1 --family 10
+      on ten vehicles of a family (ivl family --help)
   ivl sweep sweeps/paper.yaml --out runs/mine --resume
       go on after Ctrl-C, kill -9 or power loss; trials that failed are flown again
   ivl sweep sweeps/paper.yaml --scheduler tcp://10.0.0.1:8786
@@ -53,6 +56,9 @@ Examples:
       the map of the paper's landing gears
   ivl map sweeps/map.yaml --set gears=[wide_long] --json
       one of them, for a script
+  ivl map sweeps/map.yaml --set vehicle=crazyflie21 --set gear_set=table1 --family 20
+      over 20 vehicles of a family (ivl family --help): for each gear the flip that suits all of them best, its landing
+      rate as a mean, over the worst tenth of the vehicles, and the share of vehicles that it lands
 """
 
 File = Annotated[str, typer.Argument(metavar="FILE", help="YAML file.")]
@@ -65,6 +71,12 @@ Workers = Annotated[int | None, typer.Option(help="Worker processes; default: on
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="A.B=C", help="Change a field of the file or a parameter of the world."),
+]
+Family = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N", help="Fly N members of the family in place of the vehicle: --vary family.member.", min=1, max=1000
+    ),
 ]
 Vary = Annotated[
     list[str] | None,
@@ -84,6 +96,7 @@ def sweep(
     learner: Annotated[str | None, typer.Option(help="Learner by name; see `ivl list learners`.")] = None,
     settings: Settings = None,
     vary: Vary = None,
+    family: Family = None,
     policy_file: Annotated[
         Path | None,
         typer.Option("--policy", metavar="FILE", help="Fly this policy as it is; with --learner: begin with it."),
@@ -97,7 +110,7 @@ def sweep(
 
     learned = policy_options.load(policy_file)
     change = use.as_it_is(learned, learner, vary or []) if learned is not None else None
-    grid = config.load_sweep(path, settings or [], vary or [], change, learner=learner)
+    grid = config.load_sweep(path, settings or [], [*(vary or []), *_members(family)], change, learner=learner)
     if learned is not None:
         use.check_as_it_is(grid, learned, learner)
     base = f"{grid.name}-{references.title(grid.gear_set)}-{'-'.join(grid.learner_names())}"
@@ -112,6 +125,7 @@ def map_(
     workers: Workers = None,
     settings: Settings = None,
     vary: Vary = None,
+    family: Family = None,
     task_size: TaskSize = None,
     dry_run: DryRun = False,
     as_json: AsJson = False,
@@ -119,9 +133,14 @@ def map_(
     """Fly a policy map; MAP_HELP is the text that people see."""
     from ivl.sweep import config
 
-    grid = config.load_map(path, settings or [], vary or [])
+    grid = config.load_map(path, settings or [], [*(vary or []), *_members(family)])
     base = f"{grid.name}-{references.title(grid.gear_set)}"
     return _run(grid, base, "ivl map", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
+
+
+def _members(n: int | None) -> list[str]:
+    """The text of `--vary` for n members of the family."""
+    return [] if n is None else [f"{MEMBER}={','.join(map(str, range(n)))}"]
 
 
 def _run(

@@ -91,11 +91,15 @@ class Chosen:
             apply_setting(data, setting, self.kind, _LABEL)
         return data | self.given
 
+    def setup(self, *bases: BaseModel) -> tuple[Setup, str]:
+        """Set-up and landing gear, for commands that need no approach; `bases` as for `fields`."""
+        data = self.fields(*bases)
+        given = {name: value for name, value in data.items() if name in Setup.model_fields}
+        return yamlfile.validate(Setup, given, _LABEL), str(data["gear"])
+
     def make_world(self, *bases: BaseModel) -> World:
         """The world alone, for commands to which somebody else says the approach; `bases` as for `fields`."""
-        data = self.fields(*bases)
-        gear = str(data["gear"])
-        setup = yamlfile.validate(Setup, {n: v for n, v in data.items() if n in Setup.model_fields}, _LABEL)
+        setup, gear = self.setup(*bases)
         return setup.world_of(gear)
 
 

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from ivl.analysis.intervals import Estimate, share_of_clusters
+from ivl.analysis.intervals import Estimate, share_of_clusters, worst_tenth
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import go
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Family, Place, PolicyTask, fly
+from ivl.policy.flying import Drawn, Place, PolicyTask, fly
 from ivl.policy.go import BoolArray
 from ivl.policy.region import BOX, PLANE, Approaches, Region, Series
 from ivl.policy.shape import FloatArray, General, is_general
@@ -109,8 +109,8 @@ class Vehicles:
         learned_over: What the policy was learned over, likewise.
     """
 
-    drawn: Family | None
-    learned_over: Family | None
+    drawn: Drawn | None
+    learned_over: Drawn | None
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON; null stands for the vehicles of the files."""
@@ -158,7 +158,7 @@ def assess(
     n_approaches: int = 2000,
     seed: int = 0,
     threads: int | None = None,
-    family: Family | None = None,
+    family: Drawn | None = None,
 ) -> Assessment:
     """Judge a policy.
 
@@ -190,7 +190,7 @@ def fresh(region: Region, n: int, seed: int) -> Approaches:
     return Series([region], seed, Purpose.ASSESS).next(n)
 
 
-def _places(tasks: Sequence[PolicyTask], family: Family | None) -> list[Place]:
+def _places(tasks: Sequence[PolicyTask], family: Drawn | None) -> list[Place]:
     places = [Place.of(task) for task in tasks]
     if family is None:
         return places
@@ -210,7 +210,7 @@ class _Bench:
     """Flies the fresh approaches in places, which are those of each task, vehicle by vehicle."""
 
     def __init__(
-        self, policy: PolicyFile, n_tasks: int, n: int, seed: int, threads: int | None, family: Family | None
+        self, policy: PolicyFile, n_tasks: int, n: int, seed: int, threads: int | None, family: Drawn | None
     ) -> None:
         self._policy, self._n_tasks, self._n, self._seed, self._threads = policy, n_tasks, n, seed, threads
         self._is_family = family is not None
@@ -236,8 +236,7 @@ class _Bench:
         landed = four_leg(flown)
         worst = None
         if self._is_family:
-            of_vehicles = np.sort(landed.mean(axis=-1), axis=None)
-            worst = float(of_vehicles[: -(-of_vehicles.size // 10)].mean())
+            worst = worst_tenth(landed.mean(axis=-1).ravel())
         return Rates(self._share(landed), self._share(clean(flown)), worst, flown.size)
 
     def go(self, places: Sequence[Place]) -> Go:

@@ -20,7 +20,7 @@ from ivl import files, forms, native, yamlfile
 from ivl.errors import ArgumentError, ConfigError
 from ivl.experiment import LearnerChoice
 from ivl.forms import Form
-from ivl.policy.flying import Family, PolicyTask
+from ivl.policy.flying import Drawn, PolicyTask
 from ivl.policy.region import RegionField
 from ivl.settings import Finite, Strict, check_overrides
 
@@ -46,7 +46,7 @@ class Training(Strict):
 
     learner: LearnerChoice
     seed: int = Field(ge=0, lt=2**63)
-    family: Family | None = Field(default=None, description="vehicles that were drawn in place of each task's")
+    family: Drawn | None = Field(default=None, description="vehicles that were drawn in place of each task's")
     regions: list[RegionField] = Field(min_length=1, description="approaches that were drawn")
     rollouts: int = Field(ge=0, description="flights in all")
     approaches: int = Field(ge=0, description="different approaches that the search flew")

@@ -28,8 +28,8 @@ class PolicyTask(Setup):
     )
 
 
-class Family(Strict):
-    """Vehicles that are drawn in place of the one of each task; see `ivl.family`."""
+class Drawn(Strict):
+    """How many vehicles are drawn in place of the one of each task, from the family of the task (`ivl.family`)."""
 
     n_vehicles: int = Field(ge=1, le=1000, description="vehicles of each task")
     seed: int = Field(default=0, ge=0, lt=2**63)
@@ -47,13 +47,13 @@ class Place:
         """Build the world."""
         return Place(task, task.world_of(task.gear))
 
-    def members(self, drawn: Family, purpose: Purpose) -> list["Place"]:
-        """The same task with drawn vehicles; those of different purposes differ.
+    def members(self, drawn: Drawn, purpose: Purpose) -> list["Place"]:
+        """The same task with vehicles that are drawn from its family; those of different purposes differ.
 
         Raises:
-            ConfigError: The files of the task give no parameter a sigma.
+            ConfigError: Nothing of the task is uncertain.
         """
-        worlds = family.members(self.world, drawn.n_vehicles, derive(drawn.seed, purpose))
+        worlds = family.members(self.world, drawn.n_vehicles, derive(drawn.seed, purpose), self.task.family)
         return [Place(self.task, world) for world in worlds]
 
 

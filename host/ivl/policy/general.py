@@ -12,7 +12,7 @@ from ivl import experiment, native, yamlfile
 from ivl.errors import ConfigError, IvlError
 from ivl.experiment import Bounds, LearnerChoice, Named
 from ivl.learners import LEARNERS, make_learner
-from ivl.policy.flying import Family, PolicyTask
+from ivl.policy.flying import Drawn, PolicyTask
 from ivl.policy.region import RegionField
 from ivl.policy.shape import General
 from ivl.settings import Finite, Strict, apply_setting, check_overrides, locate, parse_setting, read_mapping
@@ -79,7 +79,7 @@ class GeneralExperiment(Named):
 
     form: str = Field(default="polynomial3", description="form of the policy; see `ivl list forms`")
     tasks: list[PolicyTask] = Field(min_length=1, description="what is flown; the objective is the mean")
-    family: Family | None = Field(
+    drawn: Drawn | None = Field(
         default=None, description="vehicles drawn in place of each task's; the objective is the mean over them, too"
     )
     regions: list[RegionField] = Field(min_length=1, description="box, plane, or limits of speed and angle")
@@ -121,7 +121,7 @@ def load(paths: Sequence[str], settings: Sequence[str] = (), **replacements: Any
 def _apply(data: dict[str, Any], setting: str, label: str) -> None:
     """A field of the task, or a parameter of the world, is set in every task."""
     name, _ = parse_setting(setting)
-    of_task = name in PolicyTask.model_fields or name in native.library().params
+    of_task = name.partition(".")[0] in PolicyTask.model_fields or name in native.library().params
     tasks = data.get("tasks")
     if not of_task or not isinstance(tasks, list) or not all(isinstance(task, dict) for task in tasks):
         apply_setting(data, setting, GeneralExperiment, label)

@@ -97,8 +97,8 @@ class _Run:
         self._chosen, self._tell, self._threads = chosen, tell, threads
         self._general = General(chosen.form)
         self._places = [Place.of(task) for task in chosen.tasks]
-        if chosen.family is not None:
-            self._places = [m for place in self._places for m in place.members(chosen.family, Purpose.FAMILY)]
+        if chosen.drawn is not None:
+            self._places = [m for place in self._places for m in place.members(chosen.drawn, Purpose.FAMILY)]
         self.state: _State | None = None
 
     def _known(self) -> _State:
@@ -224,7 +224,7 @@ class _Run:
         training = Training(
             learner=chosen.learner,
             seed=chosen.seed,
-            family=chosen.family,
+            family=chosen.drawn,
             regions=chosen.regions,
             rollouts=known.n_flights,
             approaches=known.n_approaches,

@@ -3,7 +3,9 @@
 from typing import Any
 
 from ivl import yamlfile
+from ivl.analysis import vehicles
 from ivl.analysis.rates import RATE, cell_rates, of_solved_cells
+from ivl.family import MEMBER
 from ivl.outcome import solved, stuck
 from ivl.sweep import plan, schema, store
 from ivl.sweep.config import PolicyMap, Sweep
@@ -56,16 +58,23 @@ def of_run(result: Result) -> dict[str, Any]:
         report["first_error"] = failed["error"][0].as_py()
     trials = store.read_frame(result.run, schema.TRIALS)
     if not len(trials):
-        return report
+        points = store.read_frame(result.run, schema.MAP)
+        return {**report, "family": vehicles.of_map(points)} if vehicles.has_family(points) else report
+    if vehicles.has_family(trials):
+        report["family"] = vehicles.of_trials(trials)
     sweep = yamlfile.validate(Sweep, store.read_manifest(result.run)["sweep"], str(result.run))
     groups = [{**names, "trials": len(part), **_learned(part)} for names, part in by_variant(sweep, trials)]
     return {**report, **_learned(trials), **({"groups": groups} if groups else {})}
 
 
 def by_variant(sweep: Sweep, trials: Any) -> list[tuple[dict[str, Value], Any]]:
-    """The trials of each variant that has any, with its values by path; nothing if only `AXES` are varied."""
+    """The trials of each variant that has any, all members of a family together, with its values by path.
+
+    Nothing if only `AXES` and members are varied.
+    """
     found = []
-    for varied in filter(None, sweep.variants()):
+    without_members = (tuple((p, v) for p, v in varied if p != MEMBER) for varied in sweep.variants())
+    for varied in filter(None, dict.fromkeys(without_members)):
         part = trials
         for path, value in varied:
             part = part[part[schema.column_of(path)] == as_cell(value)]

@@ -12,7 +12,7 @@ from ivl.cli.task_options import EQUIPMENT, Chosen, task_options
 from ivl.policy import assess as judging
 from ivl.policy import file
 from ivl.policy.assess import Assessment, Rates
-from ivl.policy.flying import Family, PolicyTask
+from ivl.policy.flying import Drawn, PolicyTask
 
 HELP = """Judge a policy on fresh approaches that no learning has seen.
 
@@ -55,7 +55,7 @@ def assess(
         task = yamlfile.validate(PolicyTask, chosen.fields(learned_on), "options")
         if task not in different:
             different.append(task)
-    drawn = Family(n_vehicles=family, seed=seed) if family is not None else None
+    drawn = Drawn(n_vehicles=family, seed=seed) if family is not None else None
     found = judging.assess(policy, different, approaches, seed, threads, drawn)
     if as_json:
         console.print_json(found.as_dict())

@@ -32,7 +32,7 @@ Examples:
       with an upward camera
   ivl policy learn experiments/general.yaml --policy g.yaml --set gear=narrow_long --out n.yaml
       search on from the numbers of another policy
-  ivl policy learn experiments/general.yaml --set vehicle=crazyflie21 --set family.n_vehicles=6 --out f.yaml
+  ivl policy learn experiments/general.yaml --set vehicle=crazyflie21 --set drawn.n_vehicles=6 --out f.yaml
       over six vehicles, drawn from the sigmas of the files of vehicle and gear (with --set gear_set=table1)
 """
 

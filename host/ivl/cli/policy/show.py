@@ -131,6 +131,8 @@ def _print_origin(policy: PolicyFile) -> None:
     for task in policy.tasks:
         told = task.model_dump(mode="json", exclude_defaults=True)
         overrides = {name: setting["value"] for name, setting in told.pop("overrides", {}).items()}
+        if told.pop("family", None):
+            told["family"] = "with a section of its own"
         _line("learned on", ", ".join(f"{name} {value}" for name, value in {**told, **overrides}.items()))
     if policy.training is not None:
         _print_training(policy.training)
