@@ -353,7 +353,12 @@ static void test_core_tells_the_approach_its_distance_and_battery(void)
     TEST_ASSERT_EQUAL_FLOAT(1.2f, fix.state.approach.aim.vx_mps);
     TEST_ASSERT_EQUAL_FLOAT(2.0f, fix.state.approach.aim.vz_mps);
     TEST_ASSERT_EQUAL_FLOAT(4.3f, fix.state.approach.aim.accel_mps2);
-    // the same with a battery of half the voltage: a quarter of the thrust, with which nothing can fly
+    // the same in another flight with a battery of half the voltage: a quarter of the thrust, with which nothing can fly
+    fix_init(&fix);
+    fix.cfg.shape = (uint8_t)IVL_SHAPE_REGION;
+    fix.in.cmd.speed_mps = 0.5f;
+    fix.in.cmd.angle_rad = IVL_HALF_PI;
+    fix_policy(&fix, 15.0f, 8.0e-3f);
     fix_request(&fix, IVL_REQUEST_HOVER);
     fix.in.vitals = (ivl_vitals_t){.given = 1u, .configured = 1u, .can_fly = 1u, .stock_idle = 1u, .vbat_V = 0.5f * 3.7f};
     fix.cfg.vbat_V_min = 1.0f;
