@@ -150,9 +150,7 @@ def _open_source(
     return links.open_source(uri, chosen, threads, replace(flight or Options(), folder=folder))
 
 
-def _simulator(
-    chosen: Experiment, threads: int | None, hooks: Hooks
-) -> tuple[Simulator | None, list[str]]:
+def _simulator(chosen: Experiment, threads: int | None, hooks: Hooks) -> tuple[Simulator | None, list[str]]:
     """Simulated vehicles for a learner that begins with them, and why there are none."""
     if not LEARNERS[chosen.learner.name].cls.uses_simulator:
         return None, []

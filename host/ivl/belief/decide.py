@@ -21,6 +21,7 @@ from scipy.interpolate import RegularGridInterpolator  # type: ignore[import-unt
 from ivl.belief.correction import Correction
 from ivl.belief.posterior import Belief
 from ivl.learners.base import draw_truncated
+from ivl.learners.ephe import above_mean, most_likely
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -111,11 +112,9 @@ def ephe(
         late, moment = rng.uniform(-TIMING_S, TIMING_S, n), rng.uniform(-MOMENT, MOMENT, n)
         flown = perturbed(theta, late, moment, bounds)
         reward = corrected(flown, belief.rate_of_one(flown))
-        weights = np.maximum(reward - reward.mean(), 0.0)
-        total = weights.sum()
-        if total <= 0.0:
+        weights = above_mean(reward)
+        if not weights.any():
             break
-        spread = np.sqrt(weights @ (theta - mu) ** 2 / total)
-        mu = weights @ theta / total
-        sigma = np.clip(spread, np.maximum(shrink_min * sigma, floor), hi - lo)
+        mean, spread = most_likely(theta, weights, mu)
+        mu, sigma = mean, np.clip(spread, np.maximum(shrink_min * sigma, floor), hi - lo)
     return mu, sigma

@@ -23,7 +23,8 @@ from pydantic import Field
 from ivl.belief import correction, decide, emulator, recording
 from ivl.belief.posterior import Belief, Evidence, Trust
 from ivl.belief.simulator import Simulator
-from ivl.learners.base import LANDED, RECORDING, FloatArray, Meta, Options, draw_truncated
+from ivl.learners.base import LANDED, RECORDING, FloatArray, Meta, draw_truncated
+from ivl.learners.bo import BOOptions
 from ivl.learners.ephe_memory import EpheMemory, EpheMemoryOptions
 
 _P_MIN = 0.02
@@ -35,6 +36,7 @@ class EpheBeliefOptions(EpheMemoryOptions):
     n_particles: int = Field(default=128, ge=16, le=5000, description="particles of the belief")
     lapse: float = Field(default=0.05, ge=0, lt=1, description="probability that an outcome says nothing")
     alarm: float = Field(default=-2.2, lt=0, description="sum of surprises below which the belief is given up")
+    floor: float = Field(default=0.03, gt=0, le=1, description="smallest sigma, in units of sigma0")
     local: float = Field(default=1.0, gt=0, le=10, description="size of the local correction, in logits")
     wide: float = Field(default=3.0, ge=1, le=10, description="factor on that size while the alarm is on")
     local_length: float = Field(default=0.2, gt=0, le=10, description="its lengths, in units of sigma0")
@@ -44,7 +46,7 @@ class EpheBeliefOptions(EpheMemoryOptions):
 class EpheBelief(EpheMemory):
     """EPHE over rollouts imagined on a belief over vehicles; without a simulator EPHE with a memory."""
 
-    Options: ClassVar[type[Options]] = EpheBeliefOptions
+    Options: ClassVar[type[BOOptions]] = EpheBeliefOptions
     uses_simulator: ClassVar[bool] = True
     options: EpheBeliefOptions
 
@@ -59,7 +61,7 @@ class EpheBelief(EpheMemory):
         """Start from simulated vehicles; before the first `ask` or `load_state_dict`."""
         trust = Trust(lapse=self.options.lapse, discrepancy=self.options.discrepancy)
         self._belief = simulator.belief(self._rng, self.options.n_particles, trust)
-        self._imagined = (self.mu0, self.sigma0)
+        self._normal = (self.mu0, self.sigma0)
         self._decide()
 
     @property
@@ -76,7 +78,7 @@ class EpheBelief(EpheMemory):
     def _ask(self, n: int) -> FloatArray:
         if self._belief is None:
             return super()._ask(n)
-        drawn = draw_truncated(self._rng, *self._imagined, self.lo, self.hi, n - 1)
+        drawn = draw_truncated(self._rng, *self._normal, self.lo, self.hi, n - 1)
         return np.vstack([self._choice, drawn])
 
     def _update(self, theta: FloatArray, rewards: FloatArray, meta: Meta, /) -> None:
@@ -95,7 +97,7 @@ class EpheBelief(EpheMemory):
         expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)
         self._corrected = correction.fit(self._theta, self._told, expected, options.local_length * self.sigma0, size)
         self._choice, self._margin_rate = decide.safest(self._belief, self._corrected, self._bounds, self._rng)
-        self._imagined = self._imagine_on_belief(*self._imagined)
+        self._normal = self._imagine_on_belief(*self._normal)
 
     def _remember(self, theta: FloatArray, rewards: FloatArray, meta: Meta) -> None:
         """Add flights to the evidence, with what was expected of them."""
@@ -127,7 +129,7 @@ class EpheBelief(EpheMemory):
         return found[int(rates.argmax())]
 
     def _distribution(self) -> tuple[FloatArray, FloatArray]:
-        return self._imagined if self._belief is not None else super()._distribution()
+        return self._normal if self._belief is not None else super()._distribution()
 
     def _recommended(self) -> FloatArray:
         return self._choice if self._belief is not None else super()._recommended()
@@ -146,7 +148,7 @@ class EpheBelief(EpheMemory):
             "foreseen": self._foreseen.tolist(),
             "choice": self._choice.tolist(),
             "margin_rate": self._margin_rate,
-            "imagined": [part.tolist() for part in self._imagined],
+            "imagined": [part.tolist() for part in self._normal],
         }
 
     def _load(self, state: Mapping[str, Any]) -> None:
@@ -165,7 +167,7 @@ class EpheBelief(EpheMemory):
         self._choice = np.array(state["choice"], dtype=np.float64)
         self._margin_rate = float(state["margin_rate"])
         mu, sigma = (np.array(part, dtype=np.float64) for part in state["imagined"])
-        self._imagined = (mu, sigma)
+        self._normal = (mu, sigma)
         self._belief.load(state["belief"], self._evidence() if len(self._theta) else None)
         size = self.options.local * (1.0 if self.model_fits else self.options.wide)
         expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)

@@ -73,12 +73,13 @@ class EpheMemory(BOLearner):
 
     def _wide(self) -> FloatArray:
         """Spread that an episode begins with, s of the module's text."""
-        return np.minimum(np.maximum(self._sigma, self.options.reach * self._hyper.lengths), np.ptp(self._box, axis=0))
+        wide = np.maximum(self._sigma, self.options.reach * self._hyper.lengths)
+        return np.asarray(np.minimum(wide, np.ptp(self._box, axis=0)))
 
     def _imagined(self, mu: FloatArray, sigma: FloatArray) -> FloatArray:
         """Policies of equation (1), shape (n_imagined, dim)."""
         drawn = self._rng.normal(mu, sigma, (self.options.n_imagined, self.dim))
-        return np.clip(drawn, *self._box)
+        return np.asarray(np.clip(drawn, *self._box))
 
     def _fitted(self, mu: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Where equations (1) to (4) lead from a distribution."""
