@@ -118,6 +118,8 @@ typedef struct
     _Atomic uint32_t    n_reading;                   ///< readings of a camera that were passed on; written by the senders' tasks
     _Atomic uint32_t    n_reading_bad;               ///< and that were refused
     app_pending_t       pending;                     ///< of the app's task
+    uint16_t            command_seq;                 ///< of the app's task: number of the last command that was taken
+    bool                has_command;                 ///< of the app's task: there was one
     ivl_parts_t         parts;                       ///< of the app's task: the policy that is arriving
     int                 n_config_polls;              ///< of the app's task: how often a commit was found waiting
 } app_t;

@@ -16,6 +16,8 @@
 #define COMMAND_MS 3u
 // the same for a commit, which the task only looks at in passing
 #define CONFIG_POLLS_MAX 20
+// packets that overtake each other are few and near
+#define OVERTAKEN_MAX 64u
 
 // not blocking: when nobody listens, an echo is lost, and the host asks again
 static void reply(uint8_t *bytes, size_t size)
@@ -98,6 +100,15 @@ static void echo_command(app_t *app, uint16_t seq, int8_t status)
     reply(bytes, ivl_wire_put_command_echo(bytes, &echo));
 }
 
+// A command that a later one has overtaken on its way is no wish of anybody any more; hosts count them up by one.  What stops is always obeyed.
+// A number that is further away is that of another host.
+static bool is_overtaken(const app_t *app, const ivl_wire_command_t *packet)
+{
+    const bool     stops = (packet->request == IVL_REQUEST_IDLE) || (packet->request == IVL_REQUEST_ABORT);
+    const uint16_t behind = (uint16_t)(app->command_seq - packet->seq);
+    return app->has_command && !stops && (behind > 0u) && (behind <= OVERTAKEN_MAX);
+}
+
 static void handle_command(app_t *app, const ivl_wire_command_t *packet)
 {
     const ivl_command_t command = {
@@ -110,12 +121,18 @@ static void handle_command(app_t *app, const ivl_wire_command_t *packet)
     {
         echo_command(app, packet->seq, IVL_WIRE_ERR_RANGE);
     }
+    else if (is_overtaken(app, packet))
+    {
+        // no answer: its host has asked for something else since
+    }
     else if (!app_put(&app->command_in, command))
     {
         echo_command(app, packet->seq, IVL_WIRE_ERR_NO_CONTROLLER);
     }
     else
     {
+        app->command_seq = packet->seq;
+        app->has_command = true;
         begin_wait(app, APP_WAITS_FOR_COMMAND, packet->seq);
     }
 }

@@ -231,9 +231,11 @@ static void decide_once(ivl_state_t *state, const ivl_seen_t *seen)
     ivl_decision_t *decision = &state->decision;
     if (decision->asked && (rule_says(state, IVL_ACT_NONE) || rule_says(state, IVL_ACT_LEVEL)))
     {
+        const bool is_first = !decision->made;
         decision->made = true;
         decision->go = state->action.go;
-        if (seen->cues.valid)
+        // a go that is asked again rests on the lowest of its probabilities: any of them could have ended it
+        if (seen->cues.valid && (is_first || !(state->action.p_land > decision->p_land)))
         {
             decision->p_land = state->action.p_land;
             decision->d_ceil_m = seen->ceiling.d_ceil_m;

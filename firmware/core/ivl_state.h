@@ -45,7 +45,7 @@ typedef struct
     bool  asked;        ///< it is to be decided in this tick
     bool  made;         ///< it was decided; a go stands once there is no way back
     bool  go;           ///< the flip may start
-    float p_land;       ///< probability of a landing that decided it; 0: no cue was ever valid when it was asked
+    float p_land;       ///< probability of a landing that decided it, the lowest that was asked; 0: no cue was ever valid then
     float d_ceil_m;     ///< distance at which it was decided; likewise
     float room_m;       ///< so far the vehicle may still rise: from the last valid cue, carried on since
     float sure_m;       ///< and so much of that is not sure

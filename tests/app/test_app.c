@@ -839,6 +839,36 @@ static void test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat(void
     TEST_ASSERT_EQUAL_UINT8(IVL_RULE_HOST, ivl_app.state.guard.cause);
 }
 
+/// What the vehicle was asked for last, after a command with a number of its own.
+static ivl_request_t asked_after(ivl_request_t request, uint16_t seq)
+{
+    const ivl_wire_command_t packet = {seq, (uint8_t)request, 0.0f, 0.0f, 1.0f, 2.5f, 1.2f};
+    uint8_t                  bytes[IVL_WIRE_SIZE_MAX];
+    handle(bytes, ivl_wire_put_command(bytes, &packet));
+    return (ivl_request_t)ivl_app.in.cmd.request;
+}
+
+static void test_command_that_was_overtaken_is_not_obeyed_unless_it_stops(void)
+{
+    const uint16_t numbers[] = {30u, 65535u, 0u, 32768u};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+    {
+        const uint16_t seq = numbers[i];
+        start_ready();
+        ivl_app.has_command = false;  // another host
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_HOVER, asked_after(IVL_REQUEST_HOVER, seq));
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_APPROACH, asked_after(IVL_REQUEST_APPROACH, (uint16_t)(seq + 1u)));
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_APPROACH, asked_after(IVL_REQUEST_HOVER, seq));
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_APPROACH, asked_after(IVL_REQUEST_HOVER, (uint16_t)(seq - 63u)));
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_APPROACH, asked_after(IVL_REQUEST_APPROACH, (uint16_t)(seq + 1u)));  // it came twice
+        assert_phase(IVL_PHASE_APPROACH);
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_HOVER, asked_after(IVL_REQUEST_HOVER, (uint16_t)(seq - 64u)));  // of another host
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_HOVER, asked_after(IVL_REQUEST_HOVER, (uint16_t)(seq + 1u)));
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_ABORT, asked_after(IVL_REQUEST_ABORT, seq));
+        TEST_ASSERT_EQUAL_INT(IVL_REQUEST_IDLE, asked_after(IVL_REQUEST_IDLE, (uint16_t)(seq - 1u)));
+    }
+}
+
 static void test_packets_arrive_through_the_task(void)
 {
     start();
@@ -968,6 +998,7 @@ int main(void)
     RUN_TEST(test_policy_after_the_trigger_is_refused);
     RUN_TEST(test_packets_are_answered_and_not_kept_when_another_controller_is_selected);
     RUN_TEST(test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat);
+    RUN_TEST(test_command_that_was_overtaken_is_not_obeyed_unless_it_stops);
     RUN_TEST(test_packets_arrive_through_the_task);
     RUN_TEST(test_noise_on_the_channel_starts_no_motor_and_breaks_nothing);
     return UNITY_END();

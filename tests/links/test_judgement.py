@@ -191,7 +191,7 @@ def test_recorder_constants_are_those_of_the_firmware() -> None:
 
 def aborted(rule: str, reason: str = "") -> Any:
     """What a vehicle remembers of an abort."""
-    return SimpleNamespace(aborted_by=rule, abort_reason=reason)
+    return SimpleNamespace(aborted_by=rule, abort_reason=reason, spoiled_by="")
 
 
 @pytest.mark.parametrize("rule", native.library().rules())

@@ -448,7 +448,7 @@ def test_a_contact_before_the_refusal_is_none_of_the_level_out(by_hand: PolicyFi
             rows = flight.rows[flight.rows.t_s < flight.outcome.t_impact_s]
             counts[world.phase_name(rows.phase[-1])] += 1
     assert (found.contacts_before, found.level_out_contacts) == (counts["approach"], counts["level_out"])
-    assert min(counts.values()) > 0
+    assert counts["approach"] > 0
 
 
 def test_a_shaped_approach_has_room_also_where_the_task_asks_for_less(by_hand: PolicyFile) -> None:

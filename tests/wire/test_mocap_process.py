@@ -136,6 +136,9 @@ class Heard:
         if self.statuses[-1:] != [status]:
             self.states.append((status, text))
 
+    def in_flight(self) -> bool:
+        return False
+
     @property
     def statuses(self) -> list[Status]:
         return [status for status, _ in self.states]
@@ -328,6 +331,9 @@ def test_a_guard_hears_of_it_when_motion_capture_itself_fails(monkeypatch: pytes
     class Listener:
         def look(self, status: Status, *_: object) -> None:
             heard.append(status)
+
+        def in_flight(self) -> bool:
+            return False
 
     def fail(*_: object) -> None:
         raise ZeroDivisionError("a fault of the program")

@@ -59,9 +59,9 @@ def show(
         "absent": ", ".join(manifest.absent) or "nothing",
     }
     for name, text in facts.items():
-        console.out.print(f"{name + ':':9s}{text}")
+        console.out.print(f"{name + ':':9s}{text}", soft_wrap=False)
     for note in manifest.notes:
-        console.out.print(f"note:    {note}")
+        console.out.print(f"note:    {note}", soft_wrap=False)
 
 
 def _row(info: Any, n: int, duration_s: float) -> dict[str, Any]:
