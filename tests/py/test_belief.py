@@ -371,10 +371,10 @@ def fly(learner: EpheBelief, world: World, n: int, seed: int, first: int = 0) ->
 def test_it_lands_vehicles_that_it_never_saw_from_the_first_flights_on(kin: Family, simulator: Simulator) -> None:
     rng = np.random.Generator(np.random.PCG64(123))
     landed, rates = [], []
-    for number in range(6):
+    for number in range(5):
         _, drone = kin.draw(rng)
-        learner = learner_of(simulator, seed=number)
-        landed.append(fly(learner, drone, 4, seed=number))
+        learner = learner_of(simulator, seed=number, n_particles=48)
+        landed.append(fly(learner, drone, 3, seed=number))
         recommended = learner.result.recommended
         rates.append(four_leg(drone.rollouts(2.5, 90.0, np.full(60, recommended[0]), recommended[1])).mean())
     assert np.mean(landed) > 0.5
@@ -382,10 +382,10 @@ def test_it_lands_vehicles_that_it_never_saw_from_the_first_flights_on(kin: Fami
 
 
 def test_the_state_continues_bit_for_bit(kin: Family, simulator: Simulator) -> None:
-    one = learner_of(simulator)
+    one = learner_of(simulator, n_particles=32)
     fly(one, kin.world, 2, seed=5)
     text = json.dumps(one.state_dict(), allow_nan=False)
-    two = learner_of(simulator, seed=9)
+    two = learner_of(simulator, seed=9, n_particles=32)
     two.load_state_dict(json.loads(text))
     assert (fly(one, kin.world, 2, seed=5, first=2)) == fly(two, kin.world, 2, seed=5, first=2)
     assert json.dumps(one.state_dict()) == json.dumps(two.state_dict())
@@ -393,7 +393,7 @@ def test_the_state_continues_bit_for_bit(kin: Family, simulator: Simulator) -> N
 
 
 def test_an_alarm_comes_when_nothing_lands_that_was_expected_to(simulator: Simulator) -> None:
-    learner = learner_of(simulator)
+    learner = learner_of(simulator, n_particles=32)
     assert learner.model_fits
     for _ in range(8):
         theta = learner.ask()
@@ -423,7 +423,8 @@ def test_without_a_simulator_it_is_ephe_with_a_memory() -> None:
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> experiment.Experiment:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr("ivl.belief.simulator.MEMBERS", 40)
-    settings = ["n_rollouts=4", "budget=16", "check.effort=0.02", "check.n_fresh=20", "start=imparted"]
+    coarse = ["check.grid.rrev_c_per_s.step=1.0", "check.grid.moment_y_Nmm.step=4.0", "learner.options.n_particles=32"]
+    settings = [*coarse, "n_rollouts=4", "budget=16", "check.effort=0.02", "check.n_fresh=20", "start=imparted"]
     return experiment.load("experiments/paper_flight.yaml", settings, learner="ephe_belief")
 
 
