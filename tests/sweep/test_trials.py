@@ -182,7 +182,9 @@ def fly_with_a_broken_cell(monkeypatch: pytest.MonkeyPatch, sweep: Sweep, run: P
 
 def test_a_worker_with_another_library_refuses_before_it_unpacks_the_world(small: Sweep) -> None:
     with pytest.raises(ivl.NativeError, match="is not that of the client"):
-        work.run_packed(small, b"of another shape", DaskTask(0, "wide_long", (Trial(2.5, 60.0, 0),)), "0" * 64, "", 60.0)
+        work.run_packed(
+            small, b"of another shape", DaskTask(0, "wide_long", (Trial(2.5, 60.0, 0),)), "0" * 64, "", 60.0
+        )
 
 
 def test_rollouts_that_the_simulation_gave_up_are_not_learned_from(
