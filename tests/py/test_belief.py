@@ -1,6 +1,8 @@
 """The belief over simulated vehicles: recordings, bank, emulators, posterior, decision, and the learner on it."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -451,3 +453,13 @@ def test_a_run_keeps_recordings_and_continues_with_the_same_bits(small: experime
 def test_a_run_says_why_it_learns_without_simulated_vehicles(small: experiment.Experiment, tmp_path: Path) -> None:
     bare = small.model_copy(update={"vehicle": "habas2021", "gear_set": "as_simulated"})
     assert "no parameter has a sigma" in " ".join(run.run(bare, tmp_path / "bare").summary["warnings"])
+
+
+def test_the_tool_that_judges_transfer_tells_its_figures() -> None:
+    tool = Path(__file__).parents[2] / "tools" / "transfer.py"
+    options = ["--drones", "2", "--flights", "2", "--learner", "ephe_robust", "--workers", "1"]
+    done = subprocess.run([sys.executable, str(tool), *options], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "ephe_robust: 2 drones, best policies land" in done.stdout
+    assert "after  2 flights: solved" in done.stdout
+    assert "failures in 2 flights" in done.stdout
