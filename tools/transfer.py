@@ -33,12 +33,13 @@ from ivl.belief.simulator import Simulator
 from ivl.learners import EpheBelief
 from ivl.learners.base import LANDED, RECORDING
 from ivl.outcome import four_leg
+from ivl.seeds import Purpose, derive
 from ivl.world import World
 
 AFTER = (1, 2, 4, 8, 24)
 _GRID, _SMOOTH, _N_GRID = (0.1, 7), (0.7, 0.5), 10
 _FINALISTS, _N_SECOND, _LAST, _N_FRESH = 16, 60, 3, 200
-_SOLVED = 0.9
+_SOLVED, _LEAST = 0.9, 1e-3
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,10 @@ class Bench:
     n_flights: int
     seed: int
 
-    def rate(self, world: World, theta: np.ndarray, n: int, seed: int) -> np.ndarray:
-        """Landing rate of policies, shape (m, 2), over n rollouts each."""
-        chosen, streams = self.chosen, np.arange(len(theta) * n).reshape(len(theta), n)
+    def rate(self, world: World, theta: np.ndarray, n: int, purpose: Purpose, first: int = 0) -> np.ndarray:
+        """Landing rate of policies, shape (m, 2), over n rollouts each, the first of which has the number `first`."""
+        chosen, seed = self.chosen, derive(self.seed, purpose)
+        streams = first + np.arange(len(theta) * n).reshape(len(theta), n)
         outcomes = world.rollouts(
             chosen.speed_mps,
             chosen.angle_deg,
@@ -70,19 +72,19 @@ class Bench:
         (r_lo, r_hi), (m_lo, m_hi) = self.chosen.policy.bounds
         axes = np.arange(max(r_lo, 2.0), r_hi, _GRID[0]), np.linspace(max(m_lo, 0.35 * m_hi), m_hi, _GRID[1])
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-        rates = self.rate(world, grid.reshape(-1, 2), _N_GRID, seed=1).reshape(grid.shape[:2])
+        rates = self.rate(world, grid.reshape(-1, 2), _N_GRID, Purpose.GRID).reshape(grid.shape[:2])
         order = np.argsort(-gaussian_filter(rates, _SMOOTH, mode="nearest").ravel(), kind="stable")
         finalists = grid.reshape(-1, 2)[order[:_FINALISTS]]
-        second = self.rate(world, finalists, _N_SECOND, seed=2)
+        second = self.rate(world, finalists, _N_SECOND, Purpose.GRID, first=1_000_000)
         last = finalists[np.argsort(-second, kind="stable")[:_LAST]]
-        return float(self.rate(world, last, _N_FRESH, seed=3).max())
+        return float(self.rate(world, last, _N_FRESH, Purpose.GRID, first=2_000_000).max())
 
     def fly(self, number: int) -> dict[str, Any]:
         """Learn on one drone."""
         rng = np.random.Generator(np.random.PCG64([self.seed, number]))
         _, drone = self.kin.draw(rng)
         best = self.best(drone)
-        learner = self.chosen.make_learner(number)
+        learner = self.chosen.make_learner(derive(self.seed + number, Purpose.LEARNER))
         if self.simulator is not None and isinstance(learner, EpheBelief):
             learner.begin(self.simulator)
         landed, shares, took_s = [], {}, 0.0
@@ -90,7 +92,8 @@ class Bench:
             began = time.process_time()
             theta = learner.ask(1)
             took_s += time.process_time() - began
-            features, outcome = recording.simulated(drone, self.chosen.flight, theta[0], number, n)
+            flight_seed = derive(self.seed + number, Purpose.WORLD)
+            features, outcome = recording.simulated(drone, self.chosen.flight, theta[0], flight_seed, n)
             landed.append(bool(four_leg(outcome)[0]))
             reward = self.chosen.reward.score(outcome)["total"]
             began = time.process_time()
@@ -98,7 +101,7 @@ class Bench:
             took_s += time.process_time() - began
             if n + 1 in AFTER:
                 recommended = learner.result.recommended[None]
-                shares[n + 1] = float(self.rate(drone, recommended, _N_FRESH, seed=4)[0]) / best
+                shares[n + 1] = float(self.rate(drone, recommended, _N_FRESH, Purpose.CHECK)[0]) / max(best, _LEAST)
         fits = learner.model_fits if isinstance(learner, EpheBelief) else None
         return {"best": best, "landed": landed, "shares": shares, "fits": fits, "cpu_s": took_s / self.n_flights}
 

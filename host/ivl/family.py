@@ -298,18 +298,29 @@ def of(world: World, choice: FamilyChoice | None = None) -> Family:
     """
     choice = choice or FamilyChoice()
     choice.check()
-    params = world.params
-    spreads: dict[str, Spread] = {
-        name: Spread(sigma=sigma, source=f"sigma of {params.origin[name]}") for name, sigma in params.sigma.items()
-    }
-    spreads |= {name: s for name, s in choice.parameters.items() if params.origin[name] != _OVERRIDE}
-    names = sorted(name for name in spreads if not _is_known(name, choice.known))
+    params, spreads = world.params, _spreads(world, choice)
+    names = sorted(spreads)
     if not names:
         who = f"vehicle {world.vehicle}, gear {world.gear_set}/{world.gear}"
         raise ConfigError(f"family: {who}: no parameter has a sigma, so that all members are alike")
     dimensions = tuple(_dimension(world, name, spreads[name]) for name in names)
     overridden = {name for name, origin in params.origin.items() if origin == _OVERRIDE}
     return Family(world, dimensions, _root(names, choice.correlations, overridden), choice.scale)
+
+
+def is_uncertain(world: World, choice: FamilyChoice) -> bool:
+    """Whether the members of the family differ at all."""
+    return bool(_spreads(world, choice))
+
+
+def _spreads(world: World, choice: FamilyChoice) -> dict[str, Spread]:
+    """The spread of each parameter that is drawn."""
+    params = world.params
+    spreads: dict[str, Spread] = {
+        name: Spread(sigma=sigma, source=f"sigma of {params.origin[name]}") for name, sigma in params.sigma.items()
+    }
+    spreads |= {name: s for name, s in choice.parameters.items() if params.origin[name] != _OVERRIDE}
+    return {name: spread for name, spread in spreads.items() if not _is_known(name, choice.known)}
 
 
 def members(world: World, n: int, seed: int, choice: FamilyChoice | None = None) -> list[World]:

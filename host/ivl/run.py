@@ -21,7 +21,7 @@ import numpy as np
 import ivl
 from ivl import assess, experiment, family, files, forms, links, native, numerics, references, yamlfile
 from ivl.belief.simulator import Simulator
-from ivl.errors import ConfigError, StoreError
+from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
 from ivl.learners import LEARNERS
@@ -156,10 +156,10 @@ def _simulator(chosen: Experiment, threads: int | None, hooks: Hooks) -> tuple[S
         return None, []
     if chosen.policy.form != forms.PAPER:
         return None, [f"learned from flights alone: a belief knows policies of the form {forms.PAPER}"]
-    try:
-        kin = family.of(chosen.nominal_world_of(chosen.gear), chosen.family)
-    except ConfigError as error:
-        return None, [f"learned from flights alone: {error}"]
+    home = chosen.nominal_world_of(chosen.gear)
+    if not family.is_uncertain(home, chosen.family):
+        return None, ["learned from flights alone: no parameter of the vehicle has a sigma"]
+    kin = family.of(home, chosen.family)
     return Simulator.of(kin, chosen.flight, threads=threads, progress=hooks.on_bank), []
 
 

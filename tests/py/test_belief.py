@@ -452,7 +452,7 @@ def test_a_run_keeps_recordings_and_continues_with_the_same_bits(small: experime
 
 def test_a_run_says_why_it_learns_without_simulated_vehicles(small: experiment.Experiment, tmp_path: Path) -> None:
     bare = small.model_copy(update={"vehicle": "habas2021", "gear_set": "as_simulated"})
-    assert "no parameter has a sigma" in " ".join(run.run(bare, tmp_path / "bare").summary["warnings"])
+    assert "no parameter of the vehicle has a sigma" in " ".join(run.run(bare, tmp_path / "bare").summary["warnings"])
 
 
 def test_the_tool_that_judges_transfer_tells_its_figures() -> None:

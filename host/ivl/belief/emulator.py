@@ -31,6 +31,7 @@ USED = tuple(
 _USED_INDEX = np.array([recording.NAMES.index(name) for name in USED])
 _RIDGE = 3.0
 _LEAST_SHARE, _LEAST_BETWEEN = 1e-3, 0.01
+_LEAST_SEEN, _UNKNOWN = 40, 1e6
 _NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 30, 0.3
 _BATCH, _RATE = 400, 2e-3
 
@@ -48,7 +49,7 @@ class Scale:
         lo: Lower bounds of the policies, shape (dim,).
         hi: Upper bounds, shape (dim,).
         mean: Mean of the conditions, shape (2,); 0 of one that no flight has.
-        sigma: Their standard deviations, shape (2,); 1 of one that no flight has.
+        sigma: Their standard deviations, shape (2,); 0 of one that no flight has, or that is always the same.
     """
 
     lo: FloatArray
@@ -62,19 +63,22 @@ class Scale:
         given = bank.features[..., recording.CONDITIONS].reshape(-1, len(recording.CONDITIONS))
         known = [column[np.isfinite(column)] for column in given.T]
         mean = np.array([column.mean() if len(column) else 0.0 for column in known])
-        sigma = np.array([column.std() or 1.0 if len(column) else 1.0 for column in known])
+        sigma = np.array([column.std() if len(column) else 0.0 for column in known])
         return Scale(bounds[:, 0], bounds[:, 1], mean, sigma)
 
     def __call__(self, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """Policies, shape (n, dim), with conditions, shape (n, 2), as shape (n, dim + 2); NaN is the mean."""
         policy = 4.0 * (theta - self.lo) / (self.hi - self.lo) - 2.0
-        others = (conditions - self.mean) / self.sigma
+        others = (conditions - self.mean) / np.where(self.sigma > 0.0, self.sigma, 1.0)
         return np.concatenate([policy, np.where(np.isfinite(others), others, 0.0)], axis=1)
 
     def conditions(self, quantiles: FloatArray) -> FloatArray:
-        """Conditions, shape (n, 2), of quantiles, shape (n, 2): a normal voltage, a uniform overshoot."""
+        """Conditions, shape (n, 2), of quantiles, shape (n, 2): a normal voltage, a uniform overshoot.
+
+        One that no flight of the bank has is unknown.
+        """
         spread = np.stack([ndtri(quantiles[:, 0]), np.sqrt(3.0) * (2.0 * quantiles[:, 1] - 1.0)], axis=1)
-        return np.asarray(self.mean + self.sigma * spread)
+        return np.asarray(np.where(self.sigma > 0.0, self.mean + self.sigma * spread, np.nan))
 
 
 @dataclass(frozen=True)
@@ -98,7 +102,7 @@ class RecordingEmulator:
 
 
 def _terms(z: FloatArray, s: FloatArray) -> FloatArray:
-    """One, all of u, all products of two, and the cubes of the policy."""
+    """One, all of u, all products of two, and the cubes of policy and conditions."""
     u = np.concatenate([z, s], axis=1)
     i, j = np.triu_indices(u.shape[1])
     return np.concatenate([np.ones((len(u), 1)), u, u[:, i] * u[:, j], s**3], axis=1)
@@ -117,6 +121,8 @@ def fit_recordings(bank: Bank, scale: Scale) -> RecordingEmulator:
         a = x[seen]
         weights[:, column] = np.linalg.solve(a.T @ a + _RIDGE * np.eye(a.shape[1]), a.T @ y[seen, column])
     residual = (y - x @ weights).reshape(n, k, -1)
+    rare = np.isfinite(residual).sum(axis=(0, 1)) < _LEAST_SEEN
+    residual[..., rare] = np.nan  # so few tell nothing of equal flights
     within, between = _covariances(residual)
     return RecordingEmulator(scale, weights, within, between)
 
@@ -135,8 +141,10 @@ def _covariances(residual: FloatArray) -> tuple[FloatArray, FloatArray]:
     number = np.einsum("na,nb->ab", rich.astype(float), rich.astype(float))
     average = np.einsum("na,nb->ab", rich / np.maximum(count, 1), rich.astype(float)) / np.maximum(number, 1.0)
     between = np.einsum("na,nb->ab", outer, outer) / np.maximum(number, 1.0) - within * np.minimum(average, average.T)
-    least = _LEAST_BETWEEN * np.diag(within)
-    return _positive(within, np.diag(within)), _positive(between, np.maximum(np.diag(between), least))
+    # what was never seen twice by one member says nothing: its errors are as large as any
+    inner_variance = np.where(np.diag(pairs) - np.diag(lost) > 0.0, np.diag(within), _UNKNOWN)
+    least = _LEAST_BETWEEN * inner_variance
+    return _positive(within, inner_variance), _positive(between, np.maximum(np.diag(between), least))
 
 
 def _positive(matrix: FloatArray, variance: FloatArray) -> FloatArray:
@@ -189,7 +197,8 @@ def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> La
         bank.features[..., recording.CONDITIONS].reshape(n * m, -1),
     )
     expected = recordings.mean(*flights)
-    emulator = LandingEmulator(recordings, expected.mean(axis=0), expected.std(axis=0), [])
+    spread = expected.std(axis=0)
+    emulator = LandingEmulator(recordings, expected.mean(axis=0), np.where(spread > 0.0, spread, 1.0), [])
     x, y = emulator.inputs(*flights), bank.landed.ravel()
     nets = []
     for number in range(_NETS):

@@ -7,7 +7,8 @@ A flight i with policy theta_i tells a recording y_i (with gaps) and whether it 
     log L_motion = -share (nu + q) / 2 log(1 + Q / nu),    share = min(1, n_full / n)                       (3)
     log L_outcome = sum log((1 - lapse) P_i + lapse / 2),  P_i = p or 1 - p                                 (4)
 
-with W_i the rows and columns of W that flight i has, and q the number of all values. b is what the emulator and the
+with W_i the rows and columns of W that flight i has, n the flights that recorded anything, and q the number of all
+their values. Where the conditions of a flight are unknown, p is averaged over them. b is what the emulator and the
 model get wrong of one vehicle: all its flights share it, so that equal errors of many flights do not add up to
 certainty. D is the discrepancy that is allowed to any model; it grows with time after the trigger. The Student-t form
 (3) leaves room for errors of unexpected size, its share for errors of unexpected shape.
@@ -17,6 +18,7 @@ particles are weighted in tempered steps, resampled, and moved by preconditioned
 prior as it is.
 """
 
+import hashlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,8 +36,8 @@ _OTHERS = {"contact_time": 0.004, "contact_distance": 0.005, "closing": 0.03}
 _MOVES, _BETA_START, _BETA_MIN, _BETA_MAX, _ACCEPTED = 4, 0.4, 0.02, 0.8, 0.3
 _BETA_FACTORS = (0.3, 1.0, 1.7)
 _EFFECTIVE, _HALVINGS, _LEAST_STEP = 0.5, 20, 1e-3
-_SPARE = 8
 _GOLDEN, _TINY = 0.6180339887498949, 1e-6
+_N_CONDITIONS, _P_MIN, _ROWS_MAX = 9, 1e-6, 20_000
 
 
 @dataclass(frozen=True)
@@ -101,14 +103,11 @@ class Belief:
             trust: How far flights are trusted.
         """
         self._recordings, self._landings, self._kin, self._trust, self._rng = recordings, landings, kin, trust, rng
+        # particles, shape (n_particles, n_dimensions)
         self._prior_b = np.linalg.inv(recordings.between + discrepancy(trust.discrepancy))
         self._beta = _BETA_START
         self.evidence: Evidence | None = None
-        self.z = np.empty((0, len(kin.dimensions)))
-        """Particles, shape (n_particles, n_dimensions)."""
-        while len(self.z) < n_particles:
-            z = rng.standard_normal((_SPARE * n_particles, len(kin.dimensions)))
-            self.z = np.concatenate([self.z, z[kin.inside(z)]])[:n_particles]
+        self.z = np.array([kin.draw(rng)[0] for _ in range(n_particles)])
 
     def log_likelihood(self, z: FloatArray, evidence: Evidence | None) -> FloatArray:
         """Equations (1) to (4), shape (len(z),)."""
@@ -117,15 +116,31 @@ class Belief:
         n, n_z = len(evidence.theta), len(z)
         flights = np.repeat(z, n, axis=0), np.tile(evidence.theta, (n_z, 1)), np.tile(evidence.conditions, (n_z, 1))
         mean = self._recordings.mean(*flights).reshape(n_z, n, -1)
-        p = self._landings.rate(*flights).reshape(n_z, n)
+        p = self._expected(flights).reshape(n_z, n)
         right = np.where(evidence.landed, p, 1.0 - p)
         outcome = np.log((1.0 - self._trust.lapse) * right + self._trust.lapse / 2.0).sum(axis=1)
         return np.asarray(outcome + self._motion(evidence.features[None] - mean))
 
+    def _expected(self, flights: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
+        """Landing rate in flights, shape (n,): averaged over conditions that are unknown."""
+        z, theta, conditions = flights
+        p = self._landings.rate(z, theta, conditions)
+        unknown = ~np.isfinite(conditions[:, self._recordings.scale.sigma > 0.0]).all(axis=1)
+        if unknown.any():
+            at = (np.arange(_N_CONDITIONS) + 0.5) / _N_CONDITIONS
+            drawn = self._recordings.scale.conditions(np.stack([at, (at * _N_CONDITIONS * _GOLDEN) % 1.0], axis=1))
+            rates = []
+            for one in drawn:
+                filled = np.where(np.isfinite(conditions[unknown]), conditions[unknown], one)
+                rates.append(self._landings.rate(z[unknown], theta[unknown], filled))
+            p[unknown] = np.mean(rates, axis=0)
+        return np.asarray(np.clip(p, _P_MIN, 1.0 - _P_MIN))
+
     def _motion(self, residual: FloatArray) -> FloatArray:
         """Equations (2) and (3) of residuals with gaps, shape (n_z, n, n_used)."""
         n_z, n, _ = residual.shape
-        square, v, information, q = np.zeros(n_z), np.zeros((n_z, len(USED))), self._prior_b.copy(), 0
+        square, v, information = np.zeros(n_z), np.zeros((n_z, len(USED))), self._prior_b.copy()
+        n_recorded = q = 0
         for i in range(n):
             seen = np.isfinite(residual[0, i])
             if not seen.any():
@@ -136,11 +151,11 @@ class Belief:
             square += np.einsum("na,na->n", weighted, r)
             v[:, seen] += weighted
             information[np.ix_(seen, seen)] += inverse
-            q += int(seen.sum())
+            n_recorded, q = n_recorded + 1, q + int(seen.sum())
         if not q:
             return np.zeros(n_z)
         square -= np.einsum("na,na->n", v @ np.linalg.inv(information), v)
-        share, nu = min(1.0, self._trust.n_full / n), self._trust.nu
+        share, nu = min(1.0, self._trust.n_full / n_recorded), self._trust.nu
         return np.asarray(-share * 0.5 * (nu + q) * np.log1p(np.maximum(square, 0.0) / nu))
 
     def update(self, evidence: Evidence) -> None:
@@ -158,7 +173,8 @@ class Belief:
     def _resample(self, log_weights: FloatArray) -> npt.NDArray[np.intp]:
         weights = np.exp(log_weights - log_weights.max())
         n, cumulative = len(weights), np.cumsum(weights) / weights.sum()
-        return np.minimum(np.searchsorted(cumulative, (np.arange(n) + self._rng.random()) / n), n - 1)
+        chosen = np.minimum(np.searchsorted(cumulative, (np.arange(n) + self._rng.random()) / n), n - 1)
+        return self._rng.permutation(chosen)  # `rates` gives each place in the list conditions of its own
 
     def _move(self, evidence: Evidence, new: FloatArray, old: FloatArray, done: float) -> tuple[FloatArray, FloatArray]:
         """One step of each particle towards the tempered posterior; log-likelihoods after and before the flights."""
@@ -181,13 +197,21 @@ class Belief:
         quantiles = np.stack([(at + 0.5) / n, (0.5 + at * _GOLDEN) % 1.0], axis=1)
         conditions = np.repeat(self._recordings.scale.conditions(quantiles), len(theta), axis=0)
         flights = np.repeat(self.z, len(theta), axis=0), np.tile(theta, (n, 1)), conditions
-        return self._landings.rate(*flights).reshape(n, len(theta))
+        parts = [slice(first, first + _ROWS_MAX) for first in range(0, len(conditions), _ROWS_MAX)]
+        rates = [self._landings.rate(*(array[part] for array in flights)) for part in parts]
+        return np.concatenate(rates).reshape(n, len(theta))
 
     def rate_of_one(self, theta: FloatArray) -> FloatArray:
         """Landing rate of policies, shape (m, dim), each of one particle under drawn conditions: shape (m,)."""
         chosen = self._rng.integers(len(self.z), size=len(theta))
         conditions = self._recordings.scale.conditions(self._rng.uniform(_TINY, 1.0 - _TINY, (len(theta), 2)))
         return self._landings.rate(self.z[chosen], theta, conditions)
+
+    def digest(self) -> str:
+        """Of the emulators: with others a search would not continue with the same bits."""
+        arrays = [self._recordings.weights, self._recordings.within, self._recordings.between]
+        arrays += [array for net in self._landings.nets for layer in net for array in layer]
+        return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
 
     def state(self) -> dict[str, Any]:
         """Particles and step, plain data; the evidence is the learner's, the generator too."""

@@ -1,4 +1,4 @@
-"""What a flight records of its flip, as a vector of features that simulated and real flights share.
+"""What a flight records of its flip, as a vector of features.
 
     pitch, rate, fall     at `TIMES_S` after the trigger, up to the first contact
     at_contact            time after the trigger, pitch, rate and fall at the first contact
@@ -21,7 +21,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl import forms
-from ivl.flight.motion import Flip
 from ivl.outcome import Outcomes
 from ivl.world import Trace, World
 
@@ -97,7 +96,7 @@ def of_trace(world: World, trace: Trace, threshold_per_s: float, rng: np.random.
     if not outcome["triggered"]:
         return np.full(N, np.nan)
     t_s = rows["t_s"] - float(outcome["t_trigger_s"])
-    at = int(np.searchsorted(t_s, 0.0))
+    at = min(int(np.searchsorted(t_s, 0.0)), len(t_s) - 1)
     sense = world.params.values
     n = len(t_s)
     pitch = np.rad2deg(np.unwrap(np.deg2rad(rows["pitch_deg"])))
@@ -112,17 +111,6 @@ def of_trace(world: World, trace: Trace, threshold_per_s: float, rng: np.random.
     overshoot = float(outcome["rrev_trigger"]) / threshold_per_s - 1.0 if threshold_per_s > 0.0 else np.nan
     crossed = abs(overshoot) < _OVERSHOOT_MAX  # else the approach began above the threshold
     return _features(t_s, pitch, rate, distance, closing, contact_s, (battery_V, overshoot if crossed else np.nan))
-
-
-def of_flip(flip: Flip, h_plane_m: float) -> FloatArray:
-    """Features of a recorded flight, shape (N,)."""
-    distance = h_plane_m - np.concatenate([[float(np.asarray(flip.state.p_W_m)[2])], flip.height_m])
-    t_s = np.concatenate([[0.0], flip.t_s])
-    pitch0 = float(np.rad2deg(2.0 * np.arctan2(-np.asarray(flip.state.q_WB)[1], np.asarray(flip.state.q_WB)[3])))
-    pitch = np.concatenate([[pitch0], flip.pitch_deg])
-    rate = np.concatenate([[-float(np.asarray(flip.state.w_B_radps)[1])], flip.rate_radps])
-    closing = np.full(len(t_s), float(np.asarray(flip.state.v_W_mps)[2]))
-    return _features(t_s, pitch, rate, distance, closing, flip.t_contact_s, (np.nan, np.nan))
 
 
 def _features(

@@ -10,10 +10,14 @@ depends on: the native library, the world, the family, the flight, the sizes and
 import hashlib
 import json
 import os
+import zipfile
+import zlib
+from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
+import scipy  # type: ignore[import-untyped]
 
 from ivl import native
 from ivl.belief import bank, emulator
@@ -60,17 +64,25 @@ class Simulator:
         """
         n_members = MEMBERS if n_members is None else n_members
         path = cache_folder() / f"bank-{_digest(kin, flight, n_members)}.npz"
-        if path.exists():
-            flown = Bank.load(path)
-        else:
+        flown = _cached(path)
+        if flown is None:
             flown = bank.make(kin, flight, n_members, _FLIGHTS, _SEED, threads, progress)
-            flown.save(path)
+            with suppress(OSError):  # it can be flown again
+                flown.save(path)
         recordings = emulator.fit_recordings(flown, emulator.Scale.of(flown, flight.bounds))
         return Simulator(kin, flight, recordings, emulator.fit_landings(flown, recordings))
 
     def belief(self, rng: np.random.Generator, n_particles: int, trust: Trust) -> Belief:
         """The belief before any flight."""
         return Belief(self.recordings, self.landings, self.kin, n_particles, rng, trust)
+
+
+def _cached(path: Path) -> Bank | None:
+    """A bank that was kept; None if there is none that can be read."""
+    try:
+        return Bank.load(path)
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile, zlib.error):
+        return None
 
 
 def cache_folder() -> Path:
@@ -83,6 +95,7 @@ def _digest(kin: Family, flight: Flight, n_members: int) -> str:
     described = {
         "version": bank.VERSION,
         "library": native.library().digest(),
+        "packages": [np.__version__, scipy.__version__],
         "world": kin.world.params.digest(),
         "dimensions": [asdict(d) for d in kin.dimensions],
         "root": kin.root.tolist(),

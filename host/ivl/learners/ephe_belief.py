@@ -23,6 +23,7 @@ from pydantic import Field
 from ivl.belief import correction, decide, emulator, recording
 from ivl.belief.posterior import Belief, Evidence, Trust
 from ivl.belief.simulator import Simulator
+from ivl.errors import LearnerError
 from ivl.learners.base import LANDED, RECORDING, FloatArray, Meta, draw_truncated
 from ivl.learners.bo import BOOptions
 from ivl.learners.ephe_memory import EpheMemory, EpheMemoryOptions
@@ -33,9 +34,9 @@ _P_MIN = 0.02
 class EpheBeliefOptions(EpheMemoryOptions):
     """Options of EPHE on a belief, beside those of EPHE with a memory."""
 
-    n_particles: int = Field(default=128, ge=16, le=5000, description="particles of the belief")
-    lapse: float = Field(default=0.05, ge=0, lt=1, description="probability that an outcome says nothing")
-    alarm: float = Field(default=-2.2, lt=0, description="sum of surprises below which the belief is given up")
+    n_particles: int = Field(default=128, ge=16, le=1000, description="particles of the belief")
+    lapse: float = Field(default=0.05, gt=0, lt=1, description="probability that an outcome says nothing")
+    alarm: float = Field(default=-2.2, lt=0, description="surprise below which no member is said to fit")
     floor: float = Field(default=0.03, gt=0, le=1, description="smallest sigma, in units of sigma0")
     local: float = Field(default=1.0, gt=0, le=10, description="size of the local correction, in logits")
     wide: float = Field(default=3.0, ge=1, le=10, description="factor on that size while the alarm is on")
@@ -103,7 +104,9 @@ class EpheBelief(EpheMemory):
         """Add flights to the evidence, with what was expected of them."""
         assert self._belief is not None
         features = np.asarray(meta.get(RECORDING, np.full((len(rewards), recording.N), np.nan)), dtype=np.float64)
-        landed = meta[LANDED].astype(bool) if LANDED in meta else rewards > rewards.max() / 2.0
+        if LANDED not in meta:
+            raise LearnerError(f"tell: meta[{LANDED!r}] is missing: a belief must be told which rollouts landed")
+        landed = meta[LANDED].astype(bool)
         self._foreseen = np.append(self._foreseen, decide.rate(self._belief, self._corrected, theta))
         self._theta = np.vstack([self._theta, theta])
         self._features = np.vstack([self._features, emulator.used(features)])
@@ -141,6 +144,7 @@ class EpheBelief(EpheMemory):
         return {
             **state,
             "belief": self._belief.state(),
+            "emulators": self._belief.digest(),
             "theta": self._theta.tolist(),
             "features": _plain(self._features),
             "conditions": _plain(self._conditions),
@@ -159,6 +163,8 @@ class EpheBelief(EpheMemory):
         if belief is None:
             raise ValueError("it began with a simulator, and none is given")
         self._belief = belief
+        if state["emulators"] != belief.digest():
+            raise ValueError("the simulated vehicles are not those it began with: another version of what fits them")
         self._theta = np.array(state["theta"], dtype=np.float64).reshape(-1, self.dim)
         self._features = np.array(state["features"], dtype=np.float64).reshape(-1, len(emulator.USED))
         self._conditions = np.array(state["conditions"], dtype=np.float64).reshape(-1, 2)

@@ -32,6 +32,7 @@ from ivl.experiment import (
     PolicyParameter,
     check_policy,
 )
+from ivl.learners import LEARNERS
 from ivl.rewards import RewardChoice
 from ivl.seeds import Purpose, derive, derive_from_key
 from ivl.settings import (
@@ -358,6 +359,10 @@ def load_sweep(
             trial = grid.experiment(gear, speed_mps, angle_deg, trial=0)
             check_policy(trial, Path(path).name)
             trial.make_learner(seed=0)
+            if LEARNERS[trial.learner.name].cls.uses_simulator and trial.policy.form == forms.PAPER:
+                raise LearnerError(
+                    f"learner.name: {trial.learner.name} begins with simulated vehicles, a sweep has none"
+                )
         except LearnerError as error:
             where = "".join(f"vary.{path}={text_of(value)}: " for path, value in varied)
             raise ConfigError(f"{Path(path).name}: {where}{error}") from error
