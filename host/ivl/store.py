@@ -306,7 +306,7 @@ class RunStore:
         figures = ", ".join(f"{name} {kind}" for name, kind in self._figures().items())
         self._db.execute(
             f"CREATE TABLE rollout({_ROLLOUT_KEY}, stream INTEGER NOT NULL, status TEXT NOT NULL, discarded TEXT, "
-            f"recording TEXT, {policy}, {rewards}, {outcome}, PRIMARY KEY(trial, episode, idx)) WITHOUT ROWID"
+            f"{policy}, {rewards}, {outcome}, recording TEXT, PRIMARY KEY(trial, episode, idx)) WITHOUT ROWID"
         )
         self._db.execute(
             f"CREATE TABLE episode(trial INTEGER, episode INTEGER, {figures}, PRIMARY KEY(trial, episode))"
