@@ -4,7 +4,8 @@
     belief = simulator.belief(rng, n_particles=128, trust=Trust())
 
 The bank behind the emulators is made once and kept in the user's cache folder, under a digest of everything that it
-depends on: the native library, the world, the family, the flight, the sizes and the seed.
+depends on: the native library, the world, the family, the flight, the sizes and the seed. Where that folder cannot be
+written, the bank is flown at each start.
 """
 
 import hashlib
