@@ -113,6 +113,8 @@ def run(
     manifest = make_manifest(packed, world, n_trials, uri)
     with ExitStack() as stack:
         simulator, notes = _simulator(chosen, threads, hooks)
+        if simulator is not None and uri is not None:
+            notes.append("the belief learned from outcomes alone: no recordings come over a link yet")
         source = _open_source(uri, chosen, world, threads, folder, flight, simulator is not None)
         stack.callback(source.close)
         store = stack.enter_context(_open(folder, packed, copies, manifest, resume))
