@@ -1,21 +1,20 @@
-"""The bank: simulated members of a family, with policies flown by each, made once for a task and cached.
+"""The bank: simulated members of a family, with policies flown by each.
 
 Every flight of the bank has its own policy. A first part of the members flies policies from the whole box; the others
-fly near policies that landed, too, since a landing window is a small share of the box. Every flight is recorded
-(`ivl.belief.recording`). A bank depends on its task, its family and its seed alone.
+fly near policies that landed, too, since a landing window is a small share of the box. Once emulators exist, each
+member can fly policies that they expect to land (`policies`). Every flight is recorded (`ivl.belief.recording`). A bank
+depends on its task, its family, its policies and its seed alone.
 """
 
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from ivl import files
 from ivl.belief import recording
 from ivl.belief.recording import Flight
 from ivl.family import Family
@@ -25,9 +24,9 @@ from ivl.world import World
 FloatArray = npt.NDArray[np.float64]
 
 Progress = Callable[[int, int], None]
+Policies = Callable[[FloatArray, np.random.Generator], FloatArray]
+"""Policies, shape (n, m, dim), for members z, shape (n, n_dimensions)."""
 
-VERSION = 3
-"""Of what a bank is made of; a cached one of another version is not used."""
 SPREAD = 1.3
 _BROAD = 0.25
 """Share of the members that fly policies from the whole box."""
@@ -51,17 +50,9 @@ class Bank:
     landed: npt.NDArray[np.bool_]
     features: FloatArray
 
-    def save(self, path: Path) -> None:
-        """Write to a file; a reader never sees half of it."""
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with files.replacing(path) as new, new.open("wb") as file:
-            np.savez_compressed(file, z=self.z, theta=self.theta, landed=self.landed, features=self.features)
-
-    @staticmethod
-    def load(path: Path) -> "Bank":
-        """Read what `save` wrote."""
-        with np.load(path, allow_pickle=False) as data:
-            return Bank(data["z"], data["theta"], data["landed"], data["features"])
+    def __add__(self, other: "Bank") -> "Bank":
+        """Both banks as one; they have as many flights a member."""
+        return Bank(*(np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(self)))
 
 
 def make(
@@ -72,6 +63,7 @@ def make(
     seed: int,
     threads: int | None = None,
     progress: Progress | None = None,
+    policies: Policies | None = None,
 ) -> Bank:
     """Fly a bank.
 
@@ -83,15 +75,19 @@ def make(
         seed: Of members, policies and flights.
         threads: Worker threads; omitted: all processors.
         progress: Called with (members done, members).
+        policies: What each member flies; omitted: policies of the box, and near landings of earlier members.
     """
     wide = replace(kin, scale=SPREAD * kin.scale)
     rng = np.random.Generator(np.random.PCG64(seed))
     drawn = [wide.draw(rng) for _ in range(n_members)]
+    z = SPREAD * np.array([z for z, _ in drawn])
     theta, near, pick = _policies(rng, flight.bounds, n_members, n_flights)
-    n_broad = max(1, round(_BROAD * n_members))
+    parts = [(0, max(1, round(_BROAD * n_members))), (max(1, round(_BROAD * n_members)), n_members)]
+    if policies is not None:
+        theta, parts = policies(z, rng), [(0, n_members)]
     results: list[tuple[npt.NDArray[np.bool_], FloatArray]] = []
     with ThreadPoolExecutor(threads or len(os.sched_getaffinity(0))) as pool:
-        for first, last in ((0, n_broad), (n_broad, n_members)):
+        for first, last in parts:
             landings = np.concatenate([t[r[0]] for t, r in zip(theta, results, strict=False)]) if results else None
             if landings is not None and len(landings):
                 chosen = landings[(pick[first:last] * len(landings)).astype(np.intp)]
@@ -103,7 +99,6 @@ def make(
                 results.append(result)
                 if progress:
                     progress(len(results), n_members)
-    z = SPREAD * np.array([z for z, _ in drawn])
     return Bank(z, theta, np.array([r[0] for r in results]), np.array([r[1] for r in results]))
 
 

@@ -2,14 +2,14 @@
 
 Fitted to a bank (`ivl.belief.bank`). u are the numbers of the member and of the policy, scaled.
 
-    recording     features = A(u) + b + e; A all products of two of u, b of the member, e of the flight;
-                  the covariances of b (between members: what the emulator does not know) and e (equal flights) are
-                  those of its residuals
+    recording     features = A(u) + N(u) + b + e; A all products of two of u, N a small neural network, b of the member,
+                  e of the flight; the covariances of b (between members: what the emulator does not know) and e (equal
+                  flights) are those of its residuals on members that it was not fitted to
     landing       P(landed | u): a mean of small neural networks (scikit-learn), each from its own seed
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -32,8 +32,17 @@ _USED_INDEX = np.array([recording.NAMES.index(name) for name in USED])
 _RIDGE = 3.0
 _LEAST_SHARE, _LEAST_BETWEEN = 1e-3, 0.01
 _LEAST_SEEN, _UNKNOWN = 40, 1e6
-_NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 30, 0.3
-_BATCH, _RATE = 400, 2e-3
+_TESTED_EVERY = 6
+"""One member of so many is kept from the fit of the recordings: their residuals give the covariances."""
+_REST_HIDDEN, _REST_EPOCHS, _REST_PENALTY, _REST_BATCH, _REST_RATE = (128, 128), 40, 0.01, 200, 2e-3
+_OUTLIER = 10.0
+"""The network of the recordings; residuals count up to `_OUTLIER` of their typical size (1.48 median |residual|)."""
+_MAD = 1.4826
+_NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 40, 0.3
+_BATCH, _RATE = 400, 1e-3
+
+Net = Sequence[tuple[FloatArray, FloatArray]]
+"""Weights and biases of the layers of a network."""
 
 
 def used(features: FloatArray) -> FloatArray:
@@ -86,45 +95,112 @@ class RecordingEmulator:
     """Mean and covariances of recordings.
 
     Attributes:
+        scale: Of policies and conditions.
         weights: Of the terms, shape (n_terms, n_used).
+        net: What the terms leave, in units of `spread`; no layers: nothing.
+        spread: Shape (n_used,).
         within: Covariance of e, shape (n_used, n_used).
         between: Covariance of b, shape (n_used, n_used).
     """
 
     scale: Scale
     weights: FloatArray
+    net: Net
+    spread: FloatArray
     within: FloatArray
     between: FloatArray
 
     def mean(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """Expected features of members z, shape (n, d), in flights, shape (n, ...): shape (n, n_used)."""
-        return _terms(z, self.scale(theta, conditions)) @ self.weights
+        u = np.concatenate([z, self.scale(theta, conditions)], axis=1)
+        expected = _terms(u, theta.shape[1]) @ self.weights
+        return expected + self.spread * forward(self.net, u) if self.net else expected
 
 
-def _terms(z: FloatArray, s: FloatArray) -> FloatArray:
-    """One, all of u, all products of two, and the cubes of policy and conditions."""
-    u = np.concatenate([z, s], axis=1)
+def forward(net: Net, u: FloatArray) -> FloatArray:
+    """Output of a network with rectifiers, in single precision, shape (n, n_out)."""
+    h: npt.NDArray[Any] = u.astype(np.float32)
+    for number, (weight, bias) in enumerate(net):
+        h = h @ weight + bias
+        if number + 1 < len(net):
+            h = np.maximum(h, 0.0)
+    return h.astype(np.float64)
+
+
+def _layers(net: Any) -> Net:
+    """Weights and biases of a fitted network of scikit-learn."""
+    pairs = zip(net.coefs_, net.intercepts_, strict=True)
+    return [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in pairs]
+
+
+def _terms(u: FloatArray, dim: int) -> FloatArray:
+    """One, all of u, all products of two, and the cubes of policy and conditions, the last of u; dim of the policy."""
     i, j = np.triu_indices(u.shape[1])
-    return np.concatenate([np.ones((len(u), 1)), u, u[:, i] * u[:, j], s**3], axis=1)
+    last = u[:, -(dim + len(recording.CONDITIONS)) :]
+    return np.concatenate([np.ones((len(u), 1)), u, u[:, i] * u[:, j], last**3], axis=1)
 
 
-def fit_recordings(bank: Bank, scale: Scale) -> RecordingEmulator:
-    """Ridge regression on the recordings of a bank."""
+def fit_recordings(bank: Bank, scale: Scale, seed: int = 0) -> RecordingEmulator:
+    """Ridge regression and a network on the recordings of a bank."""
     n, k = bank.features.shape[:2]
-    z = np.repeat(bank.z, k, axis=0)
-    theta = bank.theta[:, :k].reshape(n * k, -1)
+    theta = bank.theta.reshape(n * k, -1)
     y = used(bank.features).reshape(n * k, -1)
-    x = _terms(z, scale(theta, bank.features[..., recording.CONDITIONS].reshape(n * k, -1)))
+    u = np.concatenate(
+        [np.repeat(bank.z, k, axis=0), scale(theta, bank.features[..., recording.CONDITIONS].reshape(n * k, -1))],
+        axis=1,
+    )
+    tested = np.arange(n) % _TESTED_EVERY == _TESTED_EVERY - 1
+    fitted = np.repeat(~tested, k)
+    terms = _terms(u, theta.shape[1])
+    weights = _ridge(terms[fitted], y[fitted])
+    rest = y - terms @ weights
+    spread = _typical(rest[fitted])
+    net = _fit_rest(u[fitted], rest[fitted] / spread, seed)
+    rest = (rest - spread * forward(net, u)).reshape(n, k, -1)[tested]
+    size = _OUTLIER * _typical(rest.reshape(-1, y.shape[1]))
+    residual = np.clip(rest, -size, size)
+    rare = np.isfinite(residual).sum(axis=(0, 1)) < _LEAST_SEEN
+    residual[..., rare] = np.nan  # so few tell nothing of equal flights
+    within, between = _covariances(residual)
+    return RecordingEmulator(scale, weights, net, spread, within, between)
+
+
+def _ridge(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Weights of each column of y, which may have gaps."""
     weights = np.zeros((x.shape[1], y.shape[1]))
     for column in range(y.shape[1]):
         seen = np.isfinite(y[:, column])
         a = x[seen]
         weights[:, column] = np.linalg.solve(a.T @ a + _RIDGE * np.eye(a.shape[1]), a.T @ y[seen, column])
-    residual = (y - x @ weights).reshape(n, k, -1)
-    rare = np.isfinite(residual).sum(axis=(0, 1)) < _LEAST_SEEN
-    residual[..., rare] = np.nan  # so few tell nothing of equal flights
-    within, between = _covariances(residual)
-    return RecordingEmulator(scale, weights, within, between)
+    return weights
+
+
+def _typical(residual: FloatArray) -> FloatArray:
+    """Typical size of residuals with gaps, shape (n_used,), that outliers do not change; 1 where there are none."""
+    size = np.ones(residual.shape[1])
+    for column, values in enumerate(residual.T):
+        known = np.abs(values[np.isfinite(values)])
+        known = known[known > 0.0]
+        if len(known):
+            size[column] = _MAD * float(np.median(known))
+    return size
+
+
+def _fit_rest(u: FloatArray, rest: FloatArray, seed: int) -> Net:
+    """A network on what the terms leave; a gap counts as 0, since it is never asked for where gaps are usual."""
+    from sklearn.neural_network import MLPRegressor  # type: ignore[import-untyped]  # takes a second to load
+
+    target = np.where(np.isfinite(rest), np.clip(rest, -_OUTLIER, _OUTLIER), 0.0)
+    net = MLPRegressor(
+        hidden_layer_sizes=_REST_HIDDEN,
+        alpha=_REST_PENALTY,
+        batch_size=min(_REST_BATCH, len(u)),
+        learning_rate_init=_REST_RATE,
+        random_state=seed,
+    )
+    for _ in range(_REST_EPOCHS):
+        net.partial_fit(u, target)
+    return _layers(net)
 
 
 def _covariances(residual: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -164,7 +240,7 @@ class LandingEmulator:
     recordings: RecordingEmulator
     centre: FloatArray
     spread: FloatArray
-    nets: Sequence[Sequence[tuple[FloatArray, FloatArray]]]
+    nets: Sequence[Net]
 
     def inputs(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """Member, flight, and what it is expected to record: the motion decides the landing."""
@@ -174,21 +250,13 @@ class LandingEmulator:
 
     def rate(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """P(landed), shape (n,), of members z, shape (n, d), in flights, shape (n, ...)."""
-        u = self.inputs(z, theta, conditions).astype(np.float32)
-        total = np.zeros(len(u))
-        for net in self.nets:
-            h: npt.NDArray[Any] = u
-            for number, (weight, bias) in enumerate(net):
-                h = h @ weight + bias
-                if number + 1 < len(net):
-                    h = np.maximum(h, 0.0)
-            total += expit(h[:, 0].astype(np.float64))
-        return np.asarray(total / len(self.nets))
+        u = self.inputs(z, theta, conditions)
+        return np.asarray(np.mean([expit(forward(net, u)[:, 0]) for net in self.nets], axis=0))
 
 
-def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> LandingEmulator:
+def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0, epochs: int = _EPOCHS) -> LandingEmulator:
     """Neural networks on the landings of a bank."""
-    from sklearn.neural_network import MLPClassifier  # type: ignore[import-untyped]  # takes a second to load
+    from sklearn.neural_network import MLPClassifier  # takes a second to load
 
     n, m = bank.landed.shape
     flights = (
@@ -209,9 +277,42 @@ def fit_landings(bank: Bank, recordings: RecordingEmulator, seed: int = 0) -> La
             learning_rate_init=_RATE,
             random_state=seed + number,
         )
-        for _ in range(_EPOCHS):
+        for _ in range(epochs):
             net.partial_fit(x, y, classes=[False, True])
-        nets.append(
-            [(w.astype(np.float32), b.astype(np.float32)) for w, b in zip(net.coefs_, net.intercepts_, strict=True)]
-        )
+        nets.append(_layers(net))
     return LandingEmulator(recordings, emulator.centre, emulator.spread, nets)
+
+
+_SCALE, _RECORDING, _LANDING = "scale.", "recording.", "landing."
+
+
+def arrays(recordings: RecordingEmulator, landings: LandingEmulator) -> dict[str, npt.NDArray[Any]]:
+    """Emulators as arrays with names, for a file."""
+    found = {_SCALE + f.name: getattr(recordings.scale, f.name) for f in fields(Scale)}
+    found |= {_RECORDING + name: getattr(recordings, name) for name in ("weights", "spread", "within", "between")}
+    found |= {_LANDING + name: getattr(landings, name) for name in ("centre", "spread")}
+    for number, net in enumerate([recordings.net, *landings.nets]):
+        for layer, (weight, bias) in enumerate(net):
+            found |= {f"net.{number}.{layer}.weight": weight, f"net.{number}.{layer}.bias": bias}
+    return found
+
+
+def of_arrays(data: Mapping[str, npt.NDArray[Any]]) -> tuple[RecordingEmulator, LandingEmulator]:
+    """Inverse of `arrays`.
+
+    Raises:
+        KeyError: An array is missing.
+    """
+    scale = Scale(*(data[_SCALE + f.name] for f in fields(Scale)))
+    nets: list[Net] = []
+    while f"net.{len(nets)}.0.weight" in data:
+        number = len(nets)
+        net: list[tuple[FloatArray, FloatArray]] = []
+        while f"net.{number}.{len(net)}.weight" in data:
+            net.append((data[f"net.{number}.{len(net)}.weight"], data[f"net.{number}.{len(net)}.bias"]))
+        nets.append(net)
+    if len(nets) != 1 + _NETS:
+        raise KeyError("net")
+    weights, *others = (data[_RECORDING + name] for name in ("weights", "spread", "within", "between"))
+    recordings = RecordingEmulator(scale, weights, nets[0], *others)
+    return recordings, LandingEmulator(recordings, data[_LANDING + "centre"], data[_LANDING + "spread"], nets[1:])

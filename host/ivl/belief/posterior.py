@@ -14,8 +14,9 @@ certainty. D is the discrepancy that is allowed to any model; it grows with time
 (3) leaves room for errors of unexpected size, its share for errors of unexpected shape.
 
 The posterior over z (prior: standard normal, within the bounds of the family) is sampled by sequential Monte Carlo:
-particles are weighted in tempered steps, resampled, and moved by preconditioned Crank-Nicolson steps, which leave the
-prior as it is.
+particles are weighted in tempered steps, resampled, and moved in turn by two kinds of Metropolis steps: preconditioned
+Crank-Nicolson steps, which leave the prior as it is, and differences of two other particles (differential evolution,
+ter Braak, Stat. Comput. 16:239, 2006), which follow a narrow posterior whatever its direction.
 """
 
 import hashlib
@@ -33,9 +34,14 @@ FloatArray = npt.NDArray[np.float64]
 _SIZES = {"pitch": 4.0, "rate": 0.8, "fall": 0.005}
 _AT_S, _ALIKE_S = 0.2, 0.1
 _OTHERS = {"contact_time": 0.004, "contact_distance": 0.005, "closing": 0.03}
-_MOVES, _BETA_START, _BETA_MIN, _BETA_MAX, _ACCEPTED = 4, 0.4, 0.02, 0.8, 0.3
+_MOVES, _LAST_MOVES = 6, 24
+_BETA_START, _BETA_MIN, _BETA_MAX, _ACCEPTED = 0.4, 0.02, 0.8, 0.3
+_DIFFERENCE, _JITTER, _WHOLE = 2.38, 0.02, 0.1
+"""Difference step: its length times sqrt(2 d), its noise, and the share of steps that are a whole difference."""
 _BETA_FACTORS = (0.3, 1.0, 1.7)
 _EFFECTIVE, _HALVINGS, _LEAST_STEP = 0.5, 20, 1e-3
+_RATED = 128
+"""Particles that tell landing rates; more of them say the same, and a decision asks for thousands of policies."""
 _GOLDEN, _TINY = 0.6180339887498949, 1e-6
 _N_CONDITIONS, _P_MIN, _ROWS_MAX = 9, 1e-6, 20_000
 
@@ -111,15 +117,18 @@ class Belief:
 
     def log_likelihood(self, z: FloatArray, evidence: Evidence | None) -> FloatArray:
         """Equations (1) to (4), shape (len(z),)."""
-        if evidence is None:
-            return np.zeros(len(z))
+        return np.zeros(len(z)) if evidence is None else self._both(z, evidence, 0)[0]
+
+    def _both(self, z: FloatArray, evidence: Evidence, n_old: int) -> tuple[FloatArray, FloatArray]:
+        """Log-likelihood of all flights, and of the first `n_old` of them, shape (len(z),) each."""
         n, n_z = len(evidence.theta), len(z)
         flights = np.repeat(z, n, axis=0), np.tile(evidence.theta, (n_z, 1)), np.tile(evidence.conditions, (n_z, 1))
-        mean = self._recordings.mean(*flights).reshape(n_z, n, -1)
+        residual = evidence.features[None] - self._recordings.mean(*flights).reshape(n_z, n, -1)
         p = self._expected(flights).reshape(n_z, n)
         right = np.where(evidence.landed, p, 1.0 - p)
-        outcome = np.log((1.0 - self._trust.lapse) * right + self._trust.lapse / 2.0).sum(axis=1)
-        return np.asarray(outcome + self._motion(evidence.features[None] - mean))
+        outcome = np.log((1.0 - self._trust.lapse) * right + self._trust.lapse / 2.0)
+        parts = [outcome[:, :k].sum(axis=1) + self._motion(residual[:, :k]) if k else np.zeros(n_z) for k in (n, n_old)]
+        return np.asarray(parts[0]), np.asarray(parts[1])
 
     def _expected(self, flights: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
         """Landing rate in flights, shape (n,): averaged over conditions that are unknown."""
@@ -159,15 +168,16 @@ class Belief:
         return np.asarray(-share * 0.5 * (nu + q) * np.log1p(np.maximum(square, 0.0) / nu))
 
     def update(self, evidence: Evidence) -> None:
-        """Sample the posterior of all flights so far."""
-        old, new = (self.log_likelihood(self.z, e) for e in (self.evidence, evidence))
+        """Sample the posterior of all flights so far: those of the last update, and new ones behind them."""
+        n_old = 0 if self.evidence is None else len(self.evidence.theta)
+        new, old = self._both(self.z, evidence, n_old)
         done = 0.0
         while done < 1.0:
             share = _next_share(new - old, done)
             chosen = self._resample((share - done) * (new - old))
             self.z, new, old, done = self.z[chosen], new[chosen], old[chosen], share
-            for _ in range(_MOVES):
-                new, old = self._move(evidence, new, old, done)
+            for number in range(_MOVES if done < 1.0 else _LAST_MOVES):
+                new, old = self._move(evidence, n_old, new, old, done, number % 2 == 1)
         self.evidence = evidence
 
     def _resample(self, log_weights: FloatArray) -> npt.NDArray[np.intp]:
@@ -176,27 +186,43 @@ class Belief:
         chosen = np.minimum(np.searchsorted(cumulative, (np.arange(n) + self._rng.random()) / n), n - 1)
         return self._rng.permutation(chosen)  # `rates` gives each place in the list conditions of its own
 
-    def _move(self, evidence: Evidence, new: FloatArray, old: FloatArray, done: float) -> tuple[FloatArray, FloatArray]:
+    def _move(
+        self, evidence: Evidence, n_old: int, new: FloatArray, old: FloatArray, done: float, by_difference: bool
+    ) -> tuple[FloatArray, FloatArray]:
         """One step of each particle towards the tempered posterior; log-likelihoods after and before the flights."""
-        beta = np.minimum(self._beta * self._rng.choice(_BETA_FACTORS, (len(self.z), 1)), _BETA_MAX)
-        proposal = np.sqrt(1.0 - beta**2) * self.z + beta * self._rng.standard_normal(self.z.shape)
-        to_new, to_old = (self.log_likelihood(proposal, e) for e in (evidence, self.evidence))
-        gain = (1.0 - done) * (to_old - old) + done * (to_new - new)
+        proposal, gain = self._by_difference() if by_difference else self._by_noise()
+        to_new, to_old = self._both(proposal, evidence, n_old)
+        gain = gain + (1.0 - done) * (to_old - old) + done * (to_new - new)
         accepted = self._kin.inside(proposal) & (np.log(self._rng.random(len(gain))) < gain)
         self.z = np.where(accepted[:, None], proposal, self.z)
-        self._beta = float(np.clip(self._beta * np.exp(accepted.mean() - _ACCEPTED), _BETA_MIN, _BETA_MAX))
+        if not by_difference:
+            self._beta = float(np.clip(self._beta * np.exp(accepted.mean() - _ACCEPTED), _BETA_MIN, _BETA_MAX))
         return np.where(accepted, to_new, new), np.where(accepted, to_old, old)
 
+    def _by_noise(self) -> tuple[FloatArray, FloatArray]:
+        """Crank-Nicolson proposals, and what the prior gains, which the step itself has taken into account: 0."""
+        beta = np.minimum(self._beta * self._rng.choice(_BETA_FACTORS, (len(self.z), 1)), _BETA_MAX)
+        proposal = np.sqrt(1.0 - beta**2) * self.z + beta * self._rng.standard_normal(self.z.shape)
+        return proposal, np.zeros(len(proposal))
+
+    def _by_difference(self) -> tuple[FloatArray, FloatArray]:
+        """Proposals along the differences of two others, and what the prior gains by them."""
+        n, d = self.z.shape
+        one, other = (self.z[(np.arange(n) + self._rng.integers(1, n, n)) % n] for _ in range(2))
+        length = np.where(self._rng.random((n, 1)) < _WHOLE, 1.0, _DIFFERENCE / np.sqrt(2.0 * d))
+        proposal = self.z + length * (one - other) + _JITTER * self._rng.standard_normal((n, d))
+        return proposal, 0.5 * (self.z**2 - proposal**2).sum(axis=1)
+
     def rates(self, theta: FloatArray) -> FloatArray:
-        """Landing rate of policies, shape (m, dim), of each particle, shape (n_particles, m).
+        """Landing rate of policies, shape (m, dim), of particles, shape (at most `_RATED`, m).
 
         Each particle flies under other conditions, spread as in the bank.
         """
-        n = len(self.z)
+        n = min(len(self.z), _RATED)
         at = np.arange(n)
         quantiles = np.stack([(at + 0.5) / n, (0.5 + at * _GOLDEN) % 1.0], axis=1)
         conditions = np.repeat(self._recordings.scale.conditions(quantiles), len(theta), axis=0)
-        flights = np.repeat(self.z, len(theta), axis=0), np.tile(theta, (n, 1)), conditions
+        flights = np.repeat(self.z[:n], len(theta), axis=0), np.tile(theta, (n, 1)), conditions
         parts = [slice(first, first + _ROWS_MAX) for first in range(0, len(conditions), _ROWS_MAX)]
         rates = [self._landings.rate(*(array[part] for array in flights)) for part in parts]
         return np.concatenate(rates).reshape(n, len(theta))
@@ -210,7 +236,7 @@ class Belief:
     def digest(self) -> str:
         """Of the emulators: with others a search would not continue with the same bits."""
         arrays = [self._recordings.weights, self._recordings.within, self._recordings.between]
-        arrays += [array for net in self._landings.nets for layer in net for array in layer]
+        arrays += [array for net in (self._recordings.net, *self._landings.nets) for layer in net for array in layer]
         return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
 
     def state(self) -> dict[str, Any]:

@@ -39,6 +39,8 @@ CONDITIONS = np.array([NAMES.index("battery"), NAMES.index("overshoot")])
 
 _CLOSING_BEFORE_S = 0.02
 _LAST_S = 0.24
+_BEFORE_CONTACT_S = 0.01
+"""Samples closer to the contact are left out: its time is uncertain, and a contact turns the vehicle at once."""
 _TRACE_PERIOD_S = 0.005
 _GYRO_FULL_RADPS = 34.9
 """Full scale of the gyro (Bosch BMI088 data sheet); rates are compared up to `_CLIP_SHARE` of it."""
@@ -122,8 +124,8 @@ def _features(
     contact_s: float,
     conditions: tuple[float, float],
 ) -> FloatArray:
-    """Signals at the times of the features; NaN after the contact and after the end of the recording."""
-    end_s = contact_s if np.isfinite(contact_s) else _LAST_S
+    """Signals at the times of the features; NaN about and after the contact, and after the end of the recording."""
+    end_s = contact_s - _BEFORE_CONTACT_S if np.isfinite(contact_s) else _LAST_S
     seen = min(end_s, float(t_s[-1])) >= TIMES_S
     clip = _CLIP_SHARE * _GYRO_FULL_RADPS
     signals = (pitch, np.clip(rate, -clip, clip), float(np.interp(0.0, t_s, distance)) - distance)

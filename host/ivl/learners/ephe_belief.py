@@ -34,7 +34,7 @@ _P_MIN = 0.02
 class EpheBeliefOptions(EpheMemoryOptions):
     """Options of EPHE on a belief, beside those of EPHE with a memory."""
 
-    n_particles: int = Field(default=128, ge=16, le=1000, description="particles of the belief")
+    n_particles: int = Field(default=256, ge=16, le=1000, description="particles of the belief")
     lapse: float = Field(default=0.05, gt=0, lt=1, description="probability that an outcome says nothing")
     alarm: float = Field(default=-2.2, lt=0, description="surprise below which no member is said to fit")
     floor: float = Field(default=0.03, gt=0, le=1, description="smallest sigma, in units of sigma0")
