@@ -151,7 +151,7 @@ def find_best(condition: Condition, threads: int) -> assess.Best:
     if not path.exists():
         write(path, asdict(assess.find_best(chosen.make_world(), chosen, threads)))
     data = json.loads(path.read_text(encoding="utf-8"))
-    return assess.Best(**{**data, "theta": tuple(data["theta"])})
+    return assess.Best.of_dict(data)
 
 
 def run_cell(

@@ -71,6 +71,19 @@ class EpheBelief(EpheMemory):
         return None if self._belief is None else not self.surprise < self.options.alarm
 
     @property
+    def insight(self) -> dict[str, Any] | None:
+        """See `Learner`; also `surprise`, and `foreseen`, the landing rate that was expected of each flight so far."""
+        if self._belief is None:
+            return None
+        return {
+            "expected_rate": float(decide.rate(self._belief, self._corrected, self._choice[None])[0]),
+            "margin_rate": self._margin_rate,
+            "model_fits": bool(self.model_fits),
+            "surprise": self.surprise,
+            "foreseen": self._foreseen.tolist(),
+        }
+
+    @property
     def surprise(self) -> float:
         """See the module's text; 0 before the first flight."""
         p = np.clip(self._foreseen, _P_MIN, 1.0 - _P_MIN)

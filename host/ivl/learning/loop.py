@@ -15,7 +15,8 @@ import numpy as np
 from ivl.belief.simulator import Simulator
 from ivl.experiment import Experiment
 from ivl.learners import EpheBelief, Learner
-from ivl.learners.base import LANDED, RECORDING, FloatArray
+from ivl.learners.base import FloatArray
+from ivl.learning.earlier import Earlier, meta_of
 from ivl.learning.recorder import PLANNED, SCORED, EpisodeRow, Recorder, RolloutRows
 from ivl.outcome import RECENT_EPISODES, BoolArray, clean, four_leg
 from ivl.seeds import Purpose, derive
@@ -44,8 +45,8 @@ class Progress:
 
 
 def trials_of(experiment: Experiment, n_trials: int = 1) -> list[Experiment]:
-    """Trials of one experiment: trial t is the experiment with its seed + t."""
-    return [experiment.model_copy(update={"seed": experiment.seed + trial}) for trial in range(n_trials)]
+    """Trials of one experiment (`Experiment.trial`)."""
+    return [experiment.trial(number) for number in range(n_trials)]
 
 
 class LearningRun:
@@ -57,6 +58,7 @@ class LearningRun:
         source: RolloutSource,
         recorder: Recorder,
         simulator: Simulator | None = None,
+        earlier: Earlier | None = None,
     ) -> None:
         """Start, or continue where the recorder stands.
 
@@ -65,6 +67,7 @@ class LearningRun:
             source: Where their rollouts come from.
             recorder: Keeps what they do.
             simulator: Simulated vehicles, for learners that begin with them.
+            earlier: Flights that the learners are told before the first episode.
         """
         self._first, self._source, self._recorder = trials[0], source, recorder
         self._world_seed = np.array([derive(trial.seed, Purpose.WORLD) for trial in trials], dtype=np.uint64)
@@ -72,8 +75,12 @@ class LearningRun:
         for learner in self._learners:
             if simulator is not None and isinstance(learner, EpheBelief):
                 learner.begin(simulator)
-        for number, state in recorder.learner_states().items():
-            self._learners[number].load_state_dict(state)
+        states = recorder.learner_states()
+        for number, learner in enumerate(self._learners):
+            if number in states:
+                learner.load_state_dict(states[number])
+            elif earlier is not None:
+                earlier.tell(learner, trials[number])
         self._history: list[EpisodeRow] = recorder.episodes()
         self._n_flown = 0
 
@@ -139,9 +146,7 @@ class LearningRun:
         for trial in active:
             chosen = (rollouts.trial == trial) & scored
             outcomes, learner = rollouts.outcomes[chosen], self._learners[trial]
-            meta = {name: outcomes[name] for name in outcomes.dtype.names or ()} | {LANDED: four[chosen]}
-            if rollouts.recordings is not None:
-                meta[RECORDING] = rollouts.recordings[chosen]
+            meta = meta_of(outcomes, None if rollouts.recordings is None else rollouts.recordings[chosen])
             learner.tell(rollouts.theta[chosen], rollouts.reward[chosen], meta)
             rows.append(_episode_row(trial, episode, learner, rollouts.reward[chosen], four[chosen], spotless[chosen]))
         self._recorder.finish_episode(rows, self._states(active))
@@ -179,6 +184,7 @@ def _episode_row(
         rate_four_leg=_mean(four),
         rate_clean=_mean(spotless),
         stopped=learner.stop(),
+        insight=learner.insight,
     )
 
 
