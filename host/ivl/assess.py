@@ -384,6 +384,23 @@ def judge_each(
     return verdicts
 
 
+def rates_after(
+    worlds: Sequence[World],
+    experiment: Experiment,
+    history: Sequence[EpisodeRow],
+    episode: int,
+    threads: int | None = None,
+) -> FloatArray:
+    """Four-leg rate of what trial k recommended after an episode, over fresh rollouts in `worlds[k]`: shape (n,)."""
+    recommended, first = _recommendations(history, experiment.n_episodes), np.zeros(1, dtype=np.intp)
+    return np.array(
+        [
+            _check(world, experiment.trial(k), recommended[k, [episode]], first, episode, threads)[0][0]
+            for k, world in enumerate(worlds)
+        ]
+    )
+
+
 def summarise_each(
     verdicts: Sequence[Verdict], bests: Sequence[Best], rollouts: RolloutRows, fits: Sequence[bool | None]
 ) -> dict[str, Any]:
@@ -418,7 +435,11 @@ def summarise_each(
 
 
 def _spread(values: FloatArray) -> dict[str, float | None]:
-    return {"mean": float(values.mean()), "median": _quantile(values.tolist(), 0.5), "p90": _quantile(values.tolist(), 0.9)}
+    return {
+        "mean": float(values.mean()),
+        "median": _quantile(values.tolist(), 0.5),
+        "p90": _quantile(values.tolist(), 0.9),
+    }
 
 
 def summarise(verdicts: Sequence[Verdict]) -> dict[str, Any]:

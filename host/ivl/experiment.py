@@ -188,7 +188,7 @@ class Experiment(Task, Named):
         if not self.family.is_each:
             return [self.make_world()]
         self.family.of_trial(n_trials - 1)
-        return family.of(self.nominal_world_of(self.gear), self.family).sample(n_trials, self.family.seed).worlds
+        return family.flown(self.nominal_world_of(self.gear), self.family, n_trials)
 
     def make_learner(self, seed: int) -> Learner:
         """A new learner at the start of its search."""

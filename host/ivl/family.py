@@ -17,7 +17,7 @@ thrust of its own vehicle, as that of every world does.
 """
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -105,6 +105,12 @@ class FamilyChoice(Strict):
     member: Annotated[int | Literal["each"] | None, PlainValidator(_member)] = Field(
         default=None,
         description="flies in place of the vehicle of the files; null: that one; each: trial k flies member k",
+    )
+    member_scale: Finite = Field(
+        default=1.0,
+        gt=0,
+        le=10,
+        description="factor on `scale` for the members that fly; who learns knows `scale` alone",
     )
 
     @property
@@ -362,7 +368,17 @@ def chosen_member(world: World, choice: FamilyChoice) -> World:
         ConfigError: As `of` and `Family.sample`.
     """
     member = choice.of_trial(0).member
-    return world if member is None else of(world, choice).sample(int(member) + 1, choice.seed).worlds[-1]
+    return world if member is None else flown(world, choice, int(member) + 1)[-1]
+
+
+def flown(world: World, choice: FamilyChoice, n: int) -> list[World]:
+    """The first n members that a task may fly.
+
+    Raises:
+        ConfigError: As `of` and `Family.sample`.
+    """
+    kin = of(world, choice)
+    return replace(kin, scale=choice.member_scale * kin.scale).sample(n, choice.seed).worlds
 
 
 def _is_known(name: str, known: Sequence[str]) -> bool:

@@ -104,9 +104,7 @@ def _stepped_back(
     places = np.tile(theta, (_TRIES, 1))
     edge = bounds[i, 0] if bound == "lower" else min(bounds[i, 1], theta[i])
     places[:, i] = edge + (STEP if bound == "lower" else -STEP) * width[i]
-    places[:, other] = np.clip(
-        theta[other] + np.linspace(-_REACH, _REACH, _TRIES) * width[other], *bounds[other]
-    )
+    places[:, other] = np.clip(theta[other] + np.linspace(-_REACH, _REACH, _TRIES) * width[other], *bounds[other])
     first = assess.margin_rates(world, experiment, places, _FIRST, threads)
     finalists = places[np.argsort(-first, kind="stable")[:_FINALISTS]]
     last = assess.margin_rates(world, experiment, finalists, _LAST, threads)

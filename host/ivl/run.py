@@ -6,6 +6,7 @@ print(result.summary["solved"], result.summary["mu"])
 
 import hashlib
 import json
+import os
 import platform
 import subprocess
 from collections.abc import Callable, Sequence
@@ -133,16 +134,17 @@ def run(
     with ExitStack() as stack:
         simulator, notes = _simulator(chosen, threads, hooks)
         notes += [] if told is None else told.notes
-        if simulator is not None and uri is not None:
-            notes.append("the belief learned from outcomes alone: no recordings come over a link yet")
         for note in notes if hooks.on_note else ():
             hooks.on_note(note)
-        source = _open_source(uri, chosen, worlds if each else worlds[0], threads, folder, flight, simulator is not None)
+        source = _open_source(
+            uri, chosen, worlds if each else worlds[0], threads, folder, flight, simulator is not None
+        )
         stack.callback(source.close)
         store = stack.enter_context(_open(folder, packed, copies, manifest, resume))
         if hooks.on_start:
             hooks.on_start(folder)
-        learning = LearningRun(trials_of(chosen, n_trials or 1), source, store, simulator, told)
+        n_thinking = 1 if simulator is None else threads or len(os.sched_getaffinity(0))
+        learning = LearningRun(trials_of(chosen, n_trials or 1), source, store, simulator, told, n_thinking)
         learning.run(hooks.on_episode)
         source.close()
         flown = _Flown(chosen, worlds, each, store.episodes(), store.rollouts(), threads)
@@ -234,7 +236,7 @@ def _open_source(
         raise ConfigError(f"{each}: {uri} flies one vehicle: name a member, or leave out --trials")
     if uri is None:
         return WorldSource(where, chosen, threads, record)
-    return links.open_source(uri, chosen, threads, replace(flight or Options(), folder=folder))
+    return links.open_source(uri, chosen, threads, replace(flight or Options(), folder=folder), record)
 
 
 def _simulator(chosen: Experiment, threads: int | None, hooks: Hooks) -> tuple[Simulator | None, list[str]]:
@@ -272,7 +274,9 @@ def _earlier(runs: Sequence[Path], chosen: Experiment, uri: str | None, folder: 
 def _read_run(folder: Path) -> EarlierRun:
     """An earlier run."""
     if folder.is_file():
-        raise ConfigError(f"--from {folder}: is a file: name a run folder (--policy FILE begins with a policy's numbers)")
+        raise ConfigError(
+            f"--from {folder}: is a file: name a run folder (--policy FILE begins with a policy's numbers)"
+        )
     experiment, n_trials = read_config(folder)
     with RunStore.open_reading(folder, native.library().outcome_dtype) as store:
         return EarlierRun(folder, experiment, n_trials, read_manifest(folder).get("uri"), store.rollouts())

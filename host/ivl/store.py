@@ -57,7 +57,13 @@ _SQLITE_ADVICE = {
     sqlite3.SQLITE_CORRUPT: "the file is damaged",
     sqlite3.SQLITE_NOTADB: "the file is damaged",
 }
-_EPISODE_FIGURES = {"reward_mean": "REAL", "rate_four_leg": "REAL", "rate_clean": "REAL", "stopped": "INTEGER", "insight": "TEXT"}
+_EPISODE_FIGURES = {
+    "reward_mean": "REAL",
+    "rate_four_leg": "REAL",
+    "rate_clean": "REAL",
+    "stopped": "INTEGER",
+    "insight": "TEXT",
+}
 
 
 class RunStore:

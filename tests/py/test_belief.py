@@ -458,6 +458,7 @@ def test_a_run_says_why_it_learns_without_simulated_vehicles(small: experiment.E
 def test_the_tool_that_judges_transfer_tells_its_figures() -> None:
     tool = Path(__file__).parents[2] / "tools" / "transfer.py"
     options = ["--drones", "2", "--flights", "2", "--learner", "ephe_robust", "--workers", "1"]
+    options += ["--set", "check.effort=0.02", "--set", "check.n_fresh=20", "--scale", "2", "--set", "start=imparted"]
     done = subprocess.run([sys.executable, str(tool), *options], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "ephe_robust: 2 drones, best policies land" in done.stdout

@@ -86,7 +86,9 @@ def test_a_run_over_vehicles_judges_each_by_its_own_best_policy(tmp_path: Path) 
     beyond = [n - 8 * (1 - best.rate_four_leg) for n, best in zip(failed, bests, strict=True)]
     assert summary["failed_landings"]["mean"] == pytest.approx(np.mean(failed))
     assert summary["failed_landings_beyond_best"]["mean"] == pytest.approx(np.mean(beyond))
-    assert summary["solved"] == sum(v.rate_four_leg >= 0.9 * b.rate_four_leg for v, b in zip(result.verdicts, bests, strict=True))
+    assert summary["solved"] == sum(
+        v.rate_four_leg >= 0.9 * b.rate_four_leg for v, b in zip(result.verdicts, bests, strict=True)
+    )
     assert summary["flights_to_solved"] == summary["rollouts_to_convergence"]
     assert set(summary["failed_landings"]) >= {"mean", "p90"}
     assert summary["model_fits"] is None
@@ -95,7 +97,9 @@ def test_a_run_over_vehicles_judges_each_by_its_own_best_policy(tmp_path: Path) 
     config, n_trials = run.read_config(tmp_path / "run")
     assert (config.family.member, n_trials) == ("each", 3)
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
-    assert manifest["parameters"]["body.mass"]["value"] == chosen.nominal_world_of(chosen.gear).params.values["body.mass"]
+    assert (
+        manifest["parameters"]["body.mass"]["value"] == chosen.nominal_world_of(chosen.gear).params.values["body.mass"]
+    )
 
 
 def test_a_vehicle_is_learned_alike_alone_and_beside_others(tmp_path: Path) -> None:

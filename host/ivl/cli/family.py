@@ -45,6 +45,8 @@ and replaces it:
     seed: 0                                                 of the members
     member: null                                            fly this one, 0 or more; null: the vehicle of the files;
                                                             each: trial k of ivl learn --trials N flies member k
+    member_scale: 1.0                                       factor on the spread of the members that fly, not of the
+                                                            family that a learner is told
 
 A parameter that --set gives a value is known, and is not drawn.
 

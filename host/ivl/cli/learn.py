@@ -26,8 +26,12 @@ Examples:
       the paper's vertical landing
   ivl learn experiments/paper_vertical.yaml --learner ephe
       another learner (see: ivl list learners)
-  ivl learn experiments/paper_flight.yaml --learner ephe_belief
-      begin with simulated vehicles: the first flights land
+  ivl learn experiments/paper_flight.yaml
+      the paper's flown experiment, beginning with simulated vehicles: the first flights land
+  ivl learn experiments/paper_flight.yaml --learner bo --set n_rollouts=8 --set budget=160
+      the same by a learner that begins with nothing
+  ivl learn experiments/transfer.yaml --trials 60 --json
+      how soon sixty vehicles are learned that were never simulated exactly, and with how many failures
   ivl learn experiments/paper_vertical.yaml --set gear_set=table1 --set sense.latency=0.02
       another landing gear, slower sensing
   ivl learn experiments/paper_vertical.yaml --trials 100 --json
@@ -236,7 +240,9 @@ def _lines_of_drones(summary: dict[str, Any]) -> list[tuple[str, str]]:
     ]  # fmt: skip
     if room is not None:
         share = console.percent(room.get("share_of_largest"))
-        lines.append(("margin rate of the recommendations", f"mean {console.percent(room['mean'])}, {share} of the largest"))
+        lines.append(
+            ("margin rate of the recommendations", f"mean {console.percent(room['mean'])}, {share} of the largest")
+        )
     if fits is not None:
         lines.append(("model fits", f"{fits['yes']} of {fits['yes'] + fits['no']} vehicles"))
     return lines

@@ -82,13 +82,13 @@ class Earlier:
         with np.load(io.BytesIO(content), allow_pickle=False) as data:
             return Earlier(
                 tuple(data["runs"].tolist()), tuple(data["notes"].tolist()), data["group"], data["theta"],
-                data["outcomes"].view(np.recarray), data["recordings"] if "recordings" in data else None,
+                data["outcomes"].view(np.recarray), data.get("recordings"),
             )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Source:
-    """One earlier run: its folder, what it was, how many trials it had (None: it was no run of trials), what it flew."""
+    """One earlier run: its folder, what it was, how many trials it had (None: no run of trials), what it flew."""
 
     folder: Path
     experiment: Experiment
@@ -116,7 +116,9 @@ def gather(sources: Sequence[Source], chosen: Experiment, uri: str | None) -> Ea
         StoreError: It has no flight that can be told.
     """
     if chosen.family.is_each:
-        raise ConfigError("--from: family.member: each: the flights of one vehicle say nothing of others; name a member")
+        raise ConfigError(
+            "--from: family.member: each: the flights of one vehicle say nothing of others; name a member"
+        )
     parts, notes, group, n_groups = [], [], [], 0
     for source in sources:
         notes += _checked(source, chosen, uri)
@@ -125,7 +127,9 @@ def gather(sources: Sequence[Source], chosen: Experiment, uri: str | None) -> Ea
         inside = ((rows.theta >= bounds[:, 0]) & (rows.theta <= bounds[:, 1])).all(axis=1)
         scored = rows.status == SCORED
         if (n_outside := int((scored & ~inside).sum())) > 0:
-            notes.append(f"{source.folder}: {n_outside} flights are left out: policies outside the bounds of the search")
+            notes.append(
+                f"{source.folder}: {n_outside} flights are left out: policies outside the bounds of the search"
+            )
         told = scored & inside
         if not told.any():
             raise StoreError(f"{source.folder}: has no scored flight that this experiment can begin with")
@@ -148,7 +152,10 @@ def _recordings(parts: Sequence[tuple[RolloutRows, npt.NDArray[np.bool_]]]) -> F
         return None
     width = max(widths)
     return np.concatenate(
-        [np.full((told.sum(), width), np.nan) if rows.recordings is None else rows.recordings[told] for rows, told in parts]
+        [
+            np.full((told.sum(), width), np.nan) if rows.recordings is None else rows.recordings[told]
+            for rows, told in parts
+        ]
     )
 
 
@@ -156,7 +163,9 @@ def _checked(source: Source, chosen: Experiment, uri: str | None) -> list[str]:
     """What differs a little between an earlier run and the new one."""
     old, where = source.experiment, f"--from {source.folder}"
     if source.n_trials is not None and source.n_trials > 1:
-        raise ConfigError(f"{where}: holds {source.n_trials} trials: earlier flights are those of a run without --trials")
+        raise ConfigError(
+            f"{where}: holds {source.n_trials} trials: earlier flights are those of a run without --trials"
+        )
     _refuse_others(old, chosen, where)
     notes = []
     for name, allowed, unit in (

@@ -7,8 +7,9 @@ recorder before the learners are told.
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from ivl.learning.recorder import PLANNED, SCORED, EpisodeRow, Recorder, Rollout
 from ivl.outcome import RECENT_EPISODES, BoolArray, clean, four_leg
 from ivl.seeds import Purpose, derive
 from ivl.source import Plan, RolloutSource
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,7 @@ class LearningRun:
         recorder: Recorder,
         simulator: Simulator | None = None,
         earlier: Earlier | None = None,
+        threads: int = 1,
     ) -> None:
         """Start, or continue where the recorder stands.
 
@@ -68,7 +72,9 @@ class LearningRun:
             recorder: Keeps what they do.
             simulator: Simulated vehicles, for learners that begin with them.
             earlier: Flights that the learners are told before the first episode.
+            threads: So many learners think at the same time; worth it where each thinks long.
         """
+        self._threads = threads
         self._first, self._source, self._recorder = trials[0], source, recorder
         self._world_seed = np.array([derive(trial.seed, Purpose.WORLD) for trial in trials], dtype=np.uint64)
         self._learners = [trial.make_learner(derive(trial.seed, Purpose.LEARNER)) for trial in trials]
@@ -117,7 +123,7 @@ class LearningRun:
 
     def _plan(self, episode: int, active: list[int]) -> None:
         n = self._first.n_rollouts
-        theta = [self._learners[trial].ask() for trial in active]
+        theta = self._in_turn(lambda trial: self._learners[trial].ask(), active)
         stream = np.arange(episode * n, (episode + 1) * n, dtype=np.uint64)
         self._recorder.plan(episode, active, stream, theta, self._states(active))
 
@@ -142,15 +148,24 @@ class LearningRun:
 
     def _tell(self, episode: int, active: list[int], rollouts: RolloutRows) -> list[EpisodeRow]:
         scored, four, spotless = rollouts.status == SCORED, four_leg(rollouts.outcomes), clean(rollouts.outcomes)
-        rows = []
-        for trial in active:
+
+        def learn(trial: int) -> EpisodeRow:
             chosen = (rollouts.trial == trial) & scored
             outcomes, learner = rollouts.outcomes[chosen], self._learners[trial]
             meta = meta_of(outcomes, None if rollouts.recordings is None else rollouts.recordings[chosen])
             learner.tell(rollouts.theta[chosen], rollouts.reward[chosen], meta)
-            rows.append(_episode_row(trial, episode, learner, rollouts.reward[chosen], four[chosen], spotless[chosen]))
+            return _episode_row(trial, episode, learner, rollouts.reward[chosen], four[chosen], spotless[chosen])
+
+        rows = self._in_turn(learn, active)
         self._recorder.finish_episode(rows, self._states(active))
         return rows
+
+    def _in_turn(self, do: Callable[[int], T], trials: Sequence[int]) -> list[T]:
+        """Let each learner think, in threads if that is worth it; each has random numbers of its own."""
+        if self._threads == 1 or len(trials) == 1:
+            return [do(trial) for trial in trials]
+        with ThreadPoolExecutor(self._threads) as pool:
+            return list(pool.map(do, trials))
 
     def _states(self, trials: Iterable[int]) -> Iterator[dict[str, Any]]:
         return (self._learners[trial].state_dict() for trial in trials)
