@@ -167,9 +167,10 @@ def _draw(result: run.RunResult) -> tuple[list[Path], IvlError | None]:
     """Pictures of a single run, and why they are not all there; the result is told before that is."""
     pictures: list[Path] = []
     try:
-        from ivl.plots import convergence, strobe  # matplotlib takes a second to load
+        from ivl.plots import belief, convergence, strobe  # matplotlib takes a second to load
 
         pictures += convergence.draw_run(result)
+        pictures += belief.draw_run(result)
         pictures += strobe.draw_last_landing(result)
     except Exception as error:  # noqa: BLE001 - whatever a picture raises, it is reported after the result
         what = str(error) if isinstance(error, IvlError) else f"{type(error).__name__}: {error}"
