@@ -126,7 +126,9 @@ def run(
     each = n_trials is not None and chosen.family.is_each
     files_world = chosen.nominal_world_of(chosen.gear) if each else worlds[0]
     manifest = make_manifest(packed, files_world, n_trials, uri)
-    told = _earlier(earlier, chosen, uri, folder, resume)
+    if earlier and resume and (folder / "manifest.json").exists():
+        raise ConfigError(f"--from: {folder} is resumed with the flights that it began with: leave it out")
+    told = gather([_read_run(run) for run in earlier], chosen, uri, each) if earlier else _kept_earlier(folder, resume)
     if told is not None:
         content = told.to_bytes()
         copies = copies | {EARLIER_FILE: content}
@@ -252,13 +254,9 @@ def _simulator(chosen: Experiment, threads: int | None, hooks: Hooks) -> tuple[S
     return Simulator.of(kin, chosen.flight, threads=threads, progress=hooks.on_bank), []
 
 
-def _earlier(runs: Sequence[Path], chosen: Experiment, uri: str | None, folder: Path, resume: bool) -> Earlier | None:
-    """The flights that a run begins with: of other runs, or, where it is resumed, those that it began with."""
-    if not resume or not (folder / "manifest.json").exists():
-        return gather([_read_run(run) for run in runs], chosen, uri) if runs else None
-    if runs:
-        raise ConfigError(f"--from: {folder} is resumed with the flights that it began with: leave it out")
-    kept = read_manifest(folder).get("earlier")
+def _kept_earlier(folder: Path, resume: bool) -> Earlier | None:
+    """The flights of earlier runs with which a run that is resumed began."""
+    kept = read_manifest(folder).get("earlier") if resume and (folder / "manifest.json").exists() else None
     if kept is None:
         return None
     path = folder / EARLIER_FILE

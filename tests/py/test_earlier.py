@@ -11,7 +11,8 @@ import pytest
 from ivl import cli, experiment, run
 from ivl.errors import ConfigError, StoreError
 from ivl.experiment import Experiment
-from ivl.learning.earlier import meta_of
+from ivl.learning.earlier import gather, meta_of
+from ivl.seeds import Purpose, derive
 
 
 def of(small: Experiment, **change: Any) -> Experiment:
@@ -33,7 +34,7 @@ def test_every_learner_is_told_what_was_flown_before(
     result = run.run(chosen, tmp_path / "new", earlier=[before])
     assert result.summary["earlier"] == {"runs": [str(before)], "rollouts": 16}
     assert len(result.rollouts) == chosen.budget
-    told = chosen.make_learner(run.derive(3, run.Purpose.LEARNER))
+    told = chosen.make_learner(derive(3, Purpose.LEARNER))
     old = run._read_run(before).rollouts
     for episode in range(4):
         own = old.episode == episode
@@ -43,16 +44,14 @@ def test_every_learner_is_told_what_was_flown_before(
 
 def test_what_was_flown_is_scored_by_the_new_reward(small: Experiment, before: Path) -> None:
     old = run._read_run(before).rollouts
-    earlier = run._earlier([before], small, None, Path("none"), resume=False)
-    assert earlier is not None
+    earlier = gather([run._read_run(before)], small, None, each=False)
     assert (earlier.theta == old.theta).all()
     assert small.reward.score(earlier.outcomes)["total"] == pytest.approx(old.reward)
 
 
 def test_several_runs_are_told_in_order_and_each_episode_apart(small: Experiment, before: Path, tmp_path: Path) -> None:
     run.run(of(small, seed=8), tmp_path / "second")
-    both = run._earlier([before, tmp_path / "second"], small, None, Path("none"), resume=False)
-    assert both is not None
+    both = gather([run._read_run(before), run._read_run(tmp_path / "second")], small, None, each=False)
     assert both.group.tolist() == [k // 4 for k in range(32)]
     again = type(both).of_bytes(both.to_bytes())
     assert again.outcomes.tobytes() == both.outcomes.tobytes()
@@ -136,8 +135,7 @@ def test_policies_outside_the_bounds_are_left_out(small: Experiment, before: Pat
     lo = float(np.median(theta[:, 1]))
     narrow = {**policy, "moment_y_Nmm": {"mu0": 0.5 * (lo + 10), "sigma0": 0.1, "bounds": [lo, 10.0]}}
     n_outside = int((theta[:, 1] < lo).sum())
-    earlier = run._earlier([before], of(small, policy=narrow), None, Path("none"), resume=False)
-    assert earlier is not None
+    earlier = gather([run._read_run(before)], of(small, policy=narrow), None, each=False)
     assert len(earlier.theta) == 16 - n_outside
     assert earlier.notes == (f"{before}: {n_outside} flights are left out: policies outside the bounds of the search",)
 

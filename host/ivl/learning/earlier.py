@@ -103,19 +103,20 @@ def meta_of(outcomes: Outcomes, recordings: FloatArray | None) -> Meta:
     return meta if recordings is None else meta | {RECORDING: recordings}
 
 
-def gather(sources: Sequence[Source], chosen: Experiment, uri: str | None) -> Earlier:
+def gather(sources: Sequence[Source], chosen: Experiment, uri: str | None, each: bool) -> Earlier:
     """The flights of earlier runs as evidence for a new one.
 
     Args:
         sources: The runs, the earliest first.
         chosen: The new experiment.
         uri: Where it flies; None: the simulator.
+        each: Whether its trials have vehicles of their own.
 
     Raises:
         ConfigError: A run is of another task, or of several vehicles.
         StoreError: It has no flight that can be told.
     """
-    if chosen.family.is_each:
+    if each:
         raise ConfigError(
             "--from: family.member: each: the flights of one vehicle say nothing of others; name a member"
         )
