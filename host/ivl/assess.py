@@ -393,12 +393,11 @@ def rates_after(
 ) -> FloatArray:
     """Four-leg rate of what trial k recommended after an episode, over fresh rollouts in `worlds[k]`: shape (n,)."""
     recommended, first = _recommendations(history, experiment.n_episodes), np.zeros(1, dtype=np.intp)
-    return np.array(
-        [
-            _check(world, experiment.trial(k), recommended[k, [episode]], first, episode, threads)[0][0]
-            for k, world in enumerate(worlds)
-        ]
-    )
+    rates = [
+        _check(world, experiment.trial(k), recommended[k, [episode]], first, episode, threads)[0]
+        for k, world in enumerate(worlds)
+    ]
+    return np.concatenate(rates)
 
 
 def summarise_each(

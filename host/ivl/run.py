@@ -136,8 +136,9 @@ def run(
     with ExitStack() as stack:
         simulator, notes = _simulator(chosen, threads, hooks)
         notes += [] if told is None else told.notes
-        for note in notes if hooks.on_note else ():
-            hooks.on_note(note)
+        if hooks.on_note:
+            for note in notes:
+                hooks.on_note(note)
         source = _open_source(
             uri, chosen, worlds if each else worlds[0], threads, folder, flight, simulator is not None
         )

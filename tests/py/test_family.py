@@ -348,7 +348,7 @@ def test_a_setting_reaches_into_the_section_by_the_name_of_a_parameter() -> None
     assert chosen.family.scale == 2.0
     assert chosen.family.known == ["aero.*"]
     assert chosen.family.parameters["body.mass"].share == 0.1
-    assert landing.of_rollout(chosen, 0, (4.0, 8.0), 0).family == chosen.family
+    assert landing.of_rollout(chosen, 0, (4.0, 8.0), 0).family == chosen.trial(0).family
     with pytest.raises(ConfigError, match=r"transfer\.yaml: family\.scal: unknown key, did you mean 'family\.scale'"):
         experiment.load(TRANSFER, ["family.scal=2.0"])
     with pytest.raises(ConfigError, match=r"transfer\.yaml: family\.known: bdy\.\*: unknown parameter"):

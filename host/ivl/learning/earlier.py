@@ -69,11 +69,11 @@ class Earlier:
     def to_bytes(self) -> bytes:
         """The copy that a run folder keeps."""
         buffer = io.BytesIO()
-        recordings = {} if self.recordings is None else {"recordings": self.recordings}
-        np.savez_compressed(
-            buffer, runs=np.array(self.runs, dtype=np.str_), notes=np.array(self.notes, dtype=np.str_),
-            group=self.group, theta=self.theta, outcomes=np.asarray(self.outcomes), **recordings,
-        )  # fmt: skip
+        arrays = {"group": self.group, "theta": self.theta, "outcomes": np.asarray(self.outcomes)}
+        if self.recordings is not None:
+            arrays["recordings"] = self.recordings
+        texts = {"runs": np.array(self.runs, dtype=np.str_), "notes": np.array(self.notes, dtype=np.str_)}
+        np.savez_compressed(buffer, allow_pickle=False, **texts, **arrays)
         return buffer.getvalue()
 
     @staticmethod
@@ -219,7 +219,7 @@ def _parameters(old: Experiment, chosen: Experiment, where: str) -> list[str]:
     """
     then, now = old.make_world().params, chosen.make_world().params
     fields, told = native.library().params, []
-    spread = dict.fromkeys(now.values, 0.0) | now.sigma
+    spread = {**dict.fromkeys(now.values, 0.0), **now.sigma}
     for name, spread_of in chosen.family.parameters.items():
         share = spread_of.share or 0.0
         spread[name] = spread_of.sigma if spread_of.sigma is not None else share * abs(now.values[name])
