@@ -470,7 +470,8 @@ def _axes(experiment: Experiment) -> list[GridAxis]:
 
 def _values(axes: Sequence[GridAxis]) -> list[FloatArray]:
     """The values along each axis."""
-    return [axis.lo + axis.step * np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1) for axis in axes]
+    numbers = [np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1, dtype=np.float64) for axis in axes]
+    return [np.asarray(axis.lo + axis.step * n, dtype=np.float64) for axis, n in zip(axes, numbers, strict=True)]
 
 
 def _grid(axes: Sequence[GridAxis]) -> FloatArray:

@@ -495,7 +495,8 @@ def test_failures_that_are_expected_are_those_of_the_flights_that_are_left() -> 
 
 
 def test_a_run_says_why_it_learns_without_simulated_vehicles(small: experiment.Experiment, tmp_path: Path) -> None:
-    bare = small.model_copy(update={"vehicle": "habas2021", "gear_set": "as_simulated"})
+    changed = {"vehicle": "habas2021", "gear_set": "as_simulated", "family": FamilyChoice()}
+    bare = small.model_copy(update=changed)
     assert "no parameter of the vehicle has a sigma" in " ".join(run.run(bare, tmp_path / "bare").summary["warnings"])
 
 

@@ -65,7 +65,7 @@ class EpheBelief(EpheMemory):
         trust = Trust(lapse=self.options.lapse, discrepancy=self.options.discrepancy)
         self._belief = simulator.belief(self._rng, self.options.n_particles, trust)
         self._simulator = simulator
-        self._prior = self._quantiles()
+        self._at_first = self._quantiles()
         self._predicted: dict[str, Any] | None = None
         self._normal = (self.mu0, self.sigma0)
         self._decide()
@@ -94,7 +94,7 @@ class EpheBelief(EpheMemory):
             "belief": {
                 "names": list(kin.names),
                 "units": [d.unit for d in kin.dimensions],
-                "prior": self._prior,
+                "prior": self._at_first,
                 "quantiles": self._quantiles(),
             },
             "predicted": self._predicted,
