@@ -55,9 +55,11 @@ def test_a_software_vehicle_records_what_is_recorded_in_process(name: str) -> No
 
 
 def test_a_flight_without_a_trigger_records_nothing_over_a_link() -> None:
-    chosen = experiment.load("experiments/paper_vertical.yaml", learner="ephe_robust")
-    there, _ = compared(chosen, np.array([[0.0, 8.0]]))
+    slow = ["speed_mps=0.5", "angle_deg=20.0"]
+    chosen = experiment.load("experiments/paper_vertical.yaml", slow, learner="ephe_robust")
+    there, here = compared(chosen, np.array([[7.0, 5.0]]))
     assert np.isnan(there).all()
+    assert np.isnan(here).all()
 
 
 def test_recordings_are_downloaded_only_if_they_are_learned_from(server: SilProcess, vertical: Experiment) -> None:
