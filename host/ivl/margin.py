@@ -24,7 +24,8 @@ _ON = 0.01
 _REACH, _TRIES = 0.15, 31
 """How far the other parameter may move, as a share of its box, and the places that are tried."""
 _FIRST, _FINALISTS, _LAST = 20, 5, 200
-"""Rollouts for each point of a margin rate: of all places, and of so many finalists."""
+"""Rollouts for each point of a margin rate at an effort of 1: of all places, and of so many finalists."""
+_LEAST = 5
 MOMENT = "moment_y_Nmm"
 
 
@@ -44,7 +45,7 @@ def report(world: World, experiment: Experiment, theta: FloatArray, threads: int
     """
     rate = None
     if assess.has_margin(experiment):
-        rate = float(assess.margin_rates(world, experiment, theta[None], _LAST, threads)[0])
+        rate = float(assess.margin_rates(world, experiment, theta[None], scaled(experiment, _LAST), threads)[0])
     found = []
     for i, p in enumerate(experiment.policy.shape.params):
         (lo, hi), value = experiment.policy.bounds[i], float(theta[i])
@@ -57,6 +58,11 @@ def report(world: World, experiment: Experiment, theta: FloatArray, threads: int
             entry["stepped_back"] = _stepped_back(world, experiment, theta, i, bound, rate, threads)
         found.append(entry)
     return {"rate": rate, "on_bound": found}
+
+
+def scaled(experiment: Experiment, n_rollouts: int) -> int:
+    """A number of rollouts by the effort of the experiment's judge."""
+    return max(_LEAST, round(experiment.check.effort * n_rollouts))
 
 
 def lines(margin: dict[str, Any], best: assess.Best, experiment: Experiment) -> list[tuple[str, str]]:
@@ -105,8 +111,8 @@ def _stepped_back(
     edge = bounds[i, 0] if bound == "lower" else min(bounds[i, 1], theta[i])
     places[:, i] = edge + (STEP if bound == "lower" else -STEP) * width[i]
     places[:, other] = np.clip(theta[other] + np.linspace(-_REACH, _REACH, _TRIES) * width[other], *bounds[other])
-    first = assess.margin_rates(world, experiment, places, _FIRST, threads)
+    first = assess.margin_rates(world, experiment, places, scaled(experiment, _FIRST), threads)
     finalists = places[np.argsort(-first, kind="stable")[:_FINALISTS]]
-    last = assess.margin_rates(world, experiment, finalists, _LAST, threads)
+    last = assess.margin_rates(world, experiment, finalists, scaled(experiment, _LAST), threads)
     top = int(np.argmax(last))
     return {"theta": finalists[top].tolist(), "rate": float(last[top]), "cost": rate - float(last[top])}

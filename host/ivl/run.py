@@ -38,7 +38,7 @@ from ivl.store import EARLIER_FILE, SCHEMA_VERSION, RunStore, check_version, rea
 from ivl.world import World
 
 _N_MARGIN = 100
-"""Rollouts for each point of a recommendation's margin rate, where trials have vehicles of their own."""
+"""Rollouts for each point of a recommendation's margin rate at an effort of 1, of each trial's vehicle."""
 _MUST_MATCH = ("trials", "uri", "config_sha256", "model_sha256", "library_sha256")
 
 
@@ -212,8 +212,9 @@ def _margin_rates(flown: _Flown, bests: list[assess.Best]) -> dict[str, float] |
     """Margin rates of the recommendations, each on its own vehicle, and that as a share of the largest one there."""
     if not assess.has_margin(flown.chosen):
         return None
+    n_each = margin.scaled(flown.chosen, _N_MARGIN)
     rates = [
-        assess.margin_rates(world, flown.chosen, np.array([flown.last(k).recommended]), _N_MARGIN, flown.threads)[0]
+        assess.margin_rates(world, flown.chosen, np.array([flown.last(k).recommended]), n_each, flown.threads)[0]
         for k, world in enumerate(flown.worlds)
     ]
     shares = [
