@@ -7,7 +7,9 @@ best rate: The largest four-leg rate that any policy reaches in this world. One 
     first from where the experiment begins, then from random places, which ends where landings are; and then by clouds
     of policies around these ends, sifted like the grid, since in noise a search alone ends beside the best rate.
     Either way the last stage flies fresh rollouts, so that the figure is not inflated by having been selected.
-    `Best.search` says which it was.
+    `Best.search` says which it was. Of policies with equal rates the one with the larger margin rate is the better one.
+margin rate: The landing rate of a policy of the paper's form, averaged over errors of timing and moment
+    (`ivl.belief.decide`), by rollouts in this world. Other forms have none.
 check: After each episode the recommended policy flies `n_fresh` fresh rollouts (random numbers of the check alone).
 solved: The check after the last episode reaches `share_of_best` of the best rate (`ivl.outcome.solved`).
 converged at: The first multiple of N rollouts from which on every check reaches it.
@@ -16,12 +18,15 @@ stuck: Trials whose recommended policy at the end is stuck by the best rate (`iv
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import RegularGridInterpolator  # type: ignore[import-untyped]
 
+from ivl import forms
+from ivl.belief.decide import around
 from ivl.experiment import GRID_DIMENSIONS_MAX, Experiment, GridAxis
 from ivl.learners import make_learner
 from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
@@ -36,6 +41,9 @@ _STAGES = ((1.0, 8), (0.1, 64), (0.01, 400))
 _FINALISTS, _FINAL_ROLLOUTS = 10, 1000
 _GRID_STEPS = (140, 20)
 """Steps of each axis of the grid between the bounds of the policy, where an experiment gives no grid."""
+_WIDEST, _MARGIN_ROLLOUTS = (8, 3), (50, 100, 300)
+"""Policies that may have the largest margin rate, in two sifts, and rollouts of each sift, and of the last look, for
+each of the points that a margin rate is averaged over."""
 _SEARCHES, _GENERATIONS, _POPULATION = 8, 40, 64
 """Long searches where no grid can be flown: each begins elsewhere, and flies this many generations of rollouts."""
 _CLOUDS, _CLOUD, _CLOUD_SPREAD = 3, 320, 0.1
@@ -57,6 +65,9 @@ class Best:
         rate_clean: Its clean rate.
         n_rollouts: Rollouts spent on the search.
         search: How it was looked for, in words.
+        margin_rate: Its margin rate; None: there is none.
+        largest_margin_rate: The largest margin rate of any policy, likewise.
+        largest_margin_theta: The policy that has it.
     """
 
     theta: tuple[float, ...]
@@ -64,6 +75,15 @@ class Best:
     rate_clean: float
     n_rollouts: int
     search: str = "grid"
+    margin_rate: float | None = None
+    largest_margin_rate: float | None = None
+    largest_margin_theta: tuple[float, ...] | None = None
+
+    @staticmethod
+    def of_dict(data: dict[str, Any]) -> "Best":
+        """Inverse of `dataclasses.asdict`, also after JSON."""
+        names = ("theta", "largest_margin_theta")
+        return Best(**data | {name: tuple(data[name]) for name in names if data.get(name) is not None})
 
 
 @dataclass(frozen=True)
@@ -108,10 +128,80 @@ def find_best(
     if experiment.policy.shape.n > GRID_DIMENSIONS_MAX:
         return _search_long(flights, on_stage)
     theta = _grid(_axes(experiment))
-    chosen, four, spotless = _sift(flights, theta, (*_STAGES, (0.0, _FINAL_ROLLOUTS)), on_stage)
-    top = int(np.argmax(four))  # of the fresh rollouts of the last stage alone
-    words = f"grid of {len(theta)} policies"
-    return Best(tuple(chosen[top].tolist()), float(four[top]), float(spotless[top]), flights.n_flown, words)
+    axes = _values(_axes(experiment))
+    margins = _Margins(axes, theta) if has_margin(experiment) and all(len(axis) > 1 for axis in axes) else None
+    chosen, four, spotless = _sift(flights, theta, (*_STAGES, (0.0, _FINAL_ROLLOUTS)), on_stage, margins)
+    top = int(np.argmax(four))  # of the fresh rollouts of the last stage alone; of equal ones the first is the widest
+    best = Best(
+        tuple(chosen[top].tolist()), float(four[top]), float(spotless[top]), flights.n_flown,
+        f"grid of {len(theta)} policies",
+    )  # fmt: skip
+    return best if margins is None else _with_margins(flights, best, theta, margins)
+
+
+def has_margin(experiment: Experiment) -> bool:
+    """Whether the policies of an experiment have a margin rate."""
+    return experiment.policy.form == forms.PAPER
+
+
+def margin_rates(
+    world: World, experiment: Experiment, theta: FloatArray, n_each: int, threads: int | None = None
+) -> FloatArray:
+    """Margin rates of policies of the paper's form, shape (m,).
+
+    Args:
+        world: Where to fly.
+        experiment: Approach and bounds; its seed.
+        theta: Policies, shape (m, 2).
+        n_each: Rollouts for each of the points that a margin rate is averaged over; the same random numbers for each.
+        threads: Worker threads; omitted: all processors.
+    """
+    points, weights = around(theta, np.array(experiment.policy.bounds))
+    outcomes = world.rollouts(
+        experiment.speed_mps,
+        experiment.angle_deg,
+        *by_parameter(points[:, :, None]),
+        form=experiment.policy.form,
+        seed=derive(experiment.seed, Purpose.MARGIN),
+        stream=np.arange(n_each),
+        start=experiment.start,
+        threads=threads,
+    )
+    return np.asarray(weights @ four_leg(outcomes).mean(axis=2))
+
+
+class _Margins:
+    """Margin rates between the points of a grid, from the rates of its points."""
+
+    def __init__(self, axes: Sequence[FloatArray], theta: FloatArray) -> None:
+        self._axes = axes
+        self._points, self._weights = around(theta, np.array([[axis[0], axis[-1]] for axis in axes]))
+        self.rates = np.zeros(len(theta))
+
+    def see(self, rates: FloatArray) -> None:
+        """Take the rates of all points of the grid."""
+        between = RegularGridInterpolator(self._axes, rates.reshape([len(axis) for axis in self._axes]))
+        self.rates = self._weights @ between(self._points.reshape(-1, 2)).reshape(len(self._weights), -1)
+
+
+def _with_margins(flights: "_Flights", best: Best, theta: FloatArray, margins: _Margins) -> Best:
+    """The best policy with its margin rate, and the largest one of any policy, each from fresh rollouts."""
+    bounds = np.array(flights.experiment.policy.bounds)
+    n_first, n_second, n_last = (flights.scaled(n) for n in _MARGIN_ROLLOUTS)
+    own = flights.margin_rates(np.array([best.theta]), bounds, n_last)[0]
+    first = theta[np.argsort(-margins.rates, kind="stable")[: _WIDEST[0]]]
+    second = first[np.argsort(-flights.margin_rates(first, bounds, n_first), kind="stable")[: _WIDEST[1]]]
+    widest = second[int(np.argmax(flights.margin_rates(second, bounds, n_second)))]
+    largest = flights.margin_rates(widest[None], bounds, n_last)[0]
+    if own > largest:
+        widest, largest = np.array(best.theta), own
+    return replace(
+        best,
+        n_rollouts=flights.n_flown,
+        margin_rate=float(own),
+        largest_margin_rate=float(largest),
+        largest_margin_theta=tuple(widest.tolist()),
+    )
 
 
 class _Flights:
@@ -146,11 +236,21 @@ class _Flights:
         outcomes = self.outcomes(theta, n_each)
         return four_leg(outcomes).mean(axis=1), clean(outcomes).mean(axis=1)
 
+    def margin_rates(self, theta: FloatArray, bounds: FloatArray, n_each: int) -> FloatArray:
+        """Margin rate of each policy, shape (m,), over `n_each` rollouts for each point of the average."""
+        points, weights = around(theta, bounds)
+        four, _ = self.rates(points.reshape(-1, points.shape[-1]), n_each)
+        return np.asarray(weights @ four.reshape(len(weights), -1))
+
 
 def _sift(
-    flights: _Flights, theta: FloatArray, stages: Sequence[tuple[float, int]], on_stage: OnStage | None = None
+    flights: _Flights,
+    theta: FloatArray,
+    stages: Sequence[tuple[float, int]],
+    on_stage: OnStage | None = None,
+    margins: _Margins | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fly all policies a few times, the better ones more often, and so on.
+    """Fly all policies a few times, the better ones more often, and so on; of equal ones the wider ones.
 
     Returns:
         The policies of the last stage, and their four-leg and clean rate in it alone.
@@ -162,11 +262,17 @@ def _sift(
             on_stage(stage, len(stages))
         n_each = flights.scaled(n_full)
         rate = landed[chosen] / np.maximum(flown[chosen], 1)
-        chosen = chosen[np.argsort(-rate, kind="stable")[: max(_FINALISTS, int(share * len(theta)))]]
+        width = np.zeros(len(chosen)) if margins is None else margins.rates[chosen]
+        chosen = chosen[np.lexsort((-width, -rate))[: max(_FINALISTS, int(share * len(theta)))]]
         four, spotless = flights.rates(theta[chosen], n_each)
         landed[chosen] += four * n_each
         flown[chosen] += n_each
-    return theta[chosen], four, spotless
+        if margins is not None and stage == 0:
+            margins.see(landed / flown)
+    if margins is None:
+        return theta[chosen], four, spotless
+    order = np.lexsort((-margins.rates[chosen], -four))
+    return theta[chosen][order], four[order], spotless[order]
 
 
 def _search_long(flights: _Flights, on_stage: OnStage | None) -> Best:
@@ -260,6 +366,81 @@ def judge(
     ]
 
 
+def judge_each(
+    worlds: Sequence[World],
+    experiment: Experiment,
+    bests: Sequence[Best],
+    history: Sequence[EpisodeRow],
+    rollouts: RolloutRows,
+    threads: int | None = None,
+) -> list[Verdict]:
+    """As `judge`, where trial k flew in `worlds[k]` and its best policy is `bests[k]`."""
+    verdicts = []
+    for number, (world, best) in enumerate(zip(worlds, bests, strict=True)):
+        rows = [replace(row, trial=0) for row in history if row.trial == number]
+        own = rollouts.of_trial(number)
+        (verdict,) = judge(world, experiment.trial(number), best, rows, replace(own, trial=0 * own.trial), threads)
+        verdicts.append(replace(verdict, trial=number))
+    return verdicts
+
+
+def rates_after(
+    worlds: Sequence[World],
+    experiment: Experiment,
+    history: Sequence[EpisodeRow],
+    episode: int,
+    threads: int | None = None,
+) -> FloatArray:
+    """Four-leg rate of what trial k recommended after an episode, over fresh rollouts in `worlds[k]`: shape (n,)."""
+    recommended, first = _recommendations(history, experiment.n_episodes), np.zeros(1, dtype=np.intp)
+    rates = [
+        _check(world, experiment.trial(k), recommended[k, [episode]], first, episode, threads)[0]
+        for k, world in enumerate(worlds)
+    ]
+    return np.concatenate(rates)
+
+
+def summarise_each(
+    verdicts: Sequence[Verdict], bests: Sequence[Best], rollouts: RolloutRows, fits: Sequence[bool | None]
+) -> dict[str, Any]:
+    """Figures over trials that had vehicles of their own, beside and in place of those of `summarise`.
+
+    Each failed landing costs a part of a real vehicle, so all of them count, and beside them those that the best policy
+    of the vehicle would have been spared: failed - rollouts (1 - its rate).
+
+    Args:
+        verdicts: One for each trial.
+        bests: The best policy of each trial's vehicle.
+        rollouts: All rollouts.
+        fits: Whether the learner's model fits each trial's vehicle (`Learner.insight`); None: it has none.
+    """
+    common = summarise(verdicts)
+    failed = np.array([v.failed_landings_total for v in verdicts], dtype=np.float64)
+    scored = rollouts.status == SCORED
+    n_flown = np.array([((rollouts.trial == v.trial) & scored).sum() for v in verdicts])
+    beyond = failed - n_flown * (1.0 - np.array([best.rate_four_leg for best in bests]))
+    known = [fit for fit in fits if fit is not None]
+    return {
+        **common,
+        "flights_to_solved": common["rollouts_to_convergence"],
+        "failed_landings": _spread(failed),
+        "failed_landings_beyond_best": _spread(beyond),
+        "failed_landings_until_solved": common["failed_landings"],
+        "model_fits": sum(known) / len(known) if known else None,
+        "model_fits_trials": {"yes": sum(known), "no": len(known) - sum(known)} if known else None,
+        "best_rate_four_leg": {"mean": float(np.mean([b.rate_four_leg for b in bests])),
+                               "lowest": min(b.rate_four_leg for b in bests)},
+    }  # fmt: skip
+
+
+def _spread(values: FloatArray) -> dict[str, float | None]:
+    return {
+        "mean": float(values.mean()),
+        "median": _quantile(values.tolist(), 0.5),
+        "p90": _quantile(values.tolist(), 0.9),
+    }
+
+
 def summarise(verdicts: Sequence[Verdict]) -> dict[str, Any]:
     """Figures over all trials; never converged counts as infinitely late (printed as None)."""
     rollouts = [v.rollouts_to_convergence if v.rollouts_to_convergence is not None else np.inf for v in verdicts]
@@ -287,10 +468,15 @@ def _axes(experiment: Experiment) -> list[GridAxis]:
     return found
 
 
+def _values(axes: Sequence[GridAxis]) -> list[FloatArray]:
+    """The values along each axis."""
+    numbers = [np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1, dtype=np.float64) for axis in axes]
+    return [np.asarray(axis.lo + axis.step * n, dtype=np.float64) for axis, n in zip(axes, numbers, strict=True)]
+
+
 def _grid(axes: Sequence[GridAxis]) -> FloatArray:
     """Every combination of the axes' values, shape (m, dim)."""
-    values = [axis.lo + axis.step * np.arange(int((axis.hi - axis.lo) / axis.step + 1e-9) + 1) for axis in axes]
-    return np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))
+    return np.stack(np.meshgrid(*_values(axes), indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
 def _check(

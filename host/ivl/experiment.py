@@ -12,13 +12,14 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from ivl import forms, references, yamlfile
+from ivl import family, forms, references, yamlfile
 from ivl.belief.recording import Flight
 from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
 from ivl.rewards import RewardChoice
 from ivl.settings import PACKAGE_DIR, Finite, Strict, apply_setting, check_overrides, locate, read_mapping
 from ivl.task import Task
+from ivl.world import World
 
 EXPERIMENTS_DIR = PACKAGE_DIR / "experiments"
 GRID_DIMENSIONS_MAX = 2
@@ -173,6 +174,21 @@ class Experiment(Task, Named):
     def flight(self) -> Flight:
         """What every rollout of the experiment has in common."""
         return Flight(self.speed_mps, self.angle_deg, self.policy.form, self.start, np.array(self.policy.bounds))
+
+    def trial(self, number: int) -> "Experiment":
+        """Trial `number` of the experiment: its seed + number, and the member of the family that flies there."""
+        return self.model_copy(update={"seed": self.seed + number, "family": self.family.of_trial(number)})
+
+    def trial_worlds(self, n_trials: int) -> list[World]:
+        """The worlds that the trials fly in: one for each trial if they have vehicles of their own, else one for all.
+
+        Raises:
+            ConfigError: As `ivl.family.of` and `Family.sample`.
+        """
+        if not self.family.is_each:
+            return [self.make_world()]
+        self.family.of_trial(n_trials - 1)
+        return family.flown(self.nominal_world_of(self.gear), self.family, n_trials)
 
     def make_learner(self, seed: int) -> Learner:
         """A new learner at the start of its search."""

@@ -17,12 +17,12 @@ thrust of its own vehicle, as that of every world does.
 """
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass
-from typing import Annotated, Self
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, model_validator
+from pydantic import Field, PlainValidator, model_validator
 from scipy.special import ndtr  # type: ignore[import-untyped]
 
 from ivl import model, native, yamlfile
@@ -36,9 +36,19 @@ MEMBER = "family.member"
 """Path of the member that a task flies."""
 MEMBERS_MAX = 10_000
 """Members that a task can name."""
+EACH = "each"
+"""In place of a member's number: trial k of an experiment flies member k."""
 _TRIES = 1000
 _LEAST_EIGENVALUE = 1e-6
 _OVERRIDE = "override"  # origin of such a value, see `ivl.model.Parameters`
+
+
+def _member(value: Any) -> Any:
+    """A member as a `family:` section names it."""
+    is_number = isinstance(value, int) and not isinstance(value, bool)
+    if value is None or value == EACH or (is_number and 0 <= value < MEMBERS_MAX):
+        return value
+    raise ValueError(f"must be null, {EACH} or a whole number (allowed 0 .. {MEMBERS_MAX - 1})")
 
 
 class Spread(Strict):
@@ -92,12 +102,33 @@ class FamilyChoice(Strict):
         default=1.0, gt=0, le=10, description="factor on all of x; one that is log-uniform stays between its bounds"
     )
     seed: int = Field(default=0, ge=0, lt=2**63, description="of the members")
-    member: int | None = Field(
+    member: Annotated[int | Literal["each"] | None, PlainValidator(_member)] = Field(
         default=None,
-        ge=0,
-        lt=MEMBERS_MAX,
-        description="flies in place of the vehicle of the files; null: that one",
+        description="flies in place of the vehicle of the files; null: that one; each: trial k flies member k",
     )
+    member_scale: Finite = Field(
+        default=1.0,
+        gt=0,
+        le=10,
+        description="factor on `scale` for the members that fly; who learns knows `scale` alone",
+    )
+
+    @property
+    def is_each(self) -> bool:
+        """Whether every trial flies a vehicle of its own."""
+        return self.member == EACH
+
+    def of_trial(self, number: int) -> "FamilyChoice":
+        """The section of one trial: with the member that flies there.
+
+        Raises:
+            ConfigError: There are not so many members.
+        """
+        if not self.is_each:
+            return self
+        if number >= MEMBERS_MAX:
+            raise ConfigError(f"{MEMBER}: {EACH}: trial {number} has no member (allowed {MEMBERS_MAX} trials)")
+        return self.model_copy(update={"member": number})
 
     def check(self) -> None:
         """Check names and ranges against the library's table; what needs the world is checked by `of`.
@@ -331,10 +362,23 @@ def members(world: World, n: int, seed: int, choice: FamilyChoice | None = None)
 def chosen_member(world: World, choice: FamilyChoice) -> World:
     """What a task flies: the member that its section names, or the vehicle of the files if it names none.
 
+    Where every trial flies its own member, the first trial's stands for the task.
+
     Raises:
         ConfigError: As `of` and `Family.sample`.
     """
-    return world if choice.member is None else of(world, choice).sample(choice.member + 1, choice.seed).worlds[-1]
+    member = choice.of_trial(0).member
+    return world if member is None else flown(world, choice, int(member) + 1)[-1]
+
+
+def flown(world: World, choice: FamilyChoice, n: int) -> list[World]:
+    """The first n members that a task may fly.
+
+    Raises:
+        ConfigError: As `of` and `Family.sample`.
+    """
+    kin = of(world, choice)
+    return replace(kin, scale=choice.member_scale * kin.scale).sample(n, choice.seed).worlds
 
 
 def _is_known(name: str, known: Sequence[str]) -> bool:

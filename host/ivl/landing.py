@@ -108,11 +108,12 @@ def load(path: Path) -> LandingSpec:
 
 
 def of_rollout(experiment: Experiment, trial: int, theta: Sequence[float], stream: int) -> LandingSpec:
-    """The specification of one rollout of a learning run: trial t flies with the seed of the run plus t."""
+    """The specification of one rollout of a trial of a learning run (`Experiment.trial`)."""
+    own = experiment.trial(trial)
     return LandingSpec(
-        **experiment.task(),
-        form=experiment.policy.form,
+        **own.task(),
+        form=own.policy.form,
         theta=list(theta),
-        seed=derive(experiment.seed + trial, Purpose.WORLD),
+        seed=derive(own.seed, Purpose.WORLD),
         stream=stream,
     )

@@ -6,9 +6,10 @@ print(result.summary["solved"], result.summary["mu"])
 
 import hashlib
 import json
+import os
 import platform
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -19,21 +20,25 @@ from typing import Any
 import numpy as np
 
 import ivl
-from ivl import assess, experiment, family, files, forms, links, native, numerics, references, yamlfile
+from ivl import assess, experiment, family, files, forms, links, margin, native, numerics, references, yamlfile
 from ivl.belief.simulator import Simulator
-from ivl.errors import StoreError
+from ivl.errors import ConfigError, StoreError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
 from ivl.learners import LEARNERS
+from ivl.learning.earlier import Earlier, gather
+from ivl.learning.earlier import Source as EarlierRun
 from ivl.learning.loop import LearningRun, Progress, recent_rate, trials_of
 from ivl.learning.recorder import DISCARDED, SCORED, EpisodeRow, RolloutRows
 from ivl.links.options import Options
 from ivl.outcome import four_leg
 from ivl.settings import read_mapping
-from ivl.source import RolloutSource, WorldSource
-from ivl.store import SCHEMA_VERSION, RunStore, check_version, read_manifest, write_json
+from ivl.source import RolloutSource, TrialSource, WorldSource
+from ivl.store import EARLIER_FILE, SCHEMA_VERSION, RunStore, check_version, read_manifest, write_json
 from ivl.world import World
 
+_N_MARGIN = 100
+"""Rollouts for each point of a recommendation's margin rate at an effort of 1, of each trial's vehicle."""
 _MUST_MATCH = ("trials", "uri", "config_sha256", "model_sha256", "library_sha256")
 
 
@@ -46,12 +51,16 @@ class Hooks:
         on_episode: After each stored episode.
         on_bank: While simulated vehicles are flown before the first rollout: (vehicles done, vehicles).
         on_stage: Before each stage of the search for the best possible policy: (stage, number of stages).
+        on_drone: Before that search on the vehicle of a trial that has its own: (trial, number of trials).
+        on_note: What a reader of the results has to know, when it is known.
     """
 
     on_start: Callable[[Path], None] | None = None
     on_episode: Callable[[Progress], None] | None = None
     on_stage: Callable[[int, int], None] | None = None
     on_bank: Callable[[int, int], None] | None = None
+    on_drone: Callable[[int, int], None] | None = None
+    on_note: Callable[[str], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -61,7 +70,7 @@ class RunResult:
     Attributes:
         folder: The run folder.
         experiment: What was run.
-        world: The world it ran in.
+        world: The world it ran in; that of the first trial where each has its own.
         best: The best possible policy there.
         verdicts: One per trial.
         history: Every episode of every trial.
@@ -88,6 +97,7 @@ def run(
     hooks: Hooks | None = None,
     uri: str | None = None,
     flight: Options | None = None,
+    earlier: Sequence[Path] = (),
 ) -> RunResult:
     """Learn, judge and summarise; everything lands in `folder`.
 
@@ -101,55 +111,136 @@ def run(
         uri: Where to fly (see `ivl.links`); omitted: the simulator in this process, which also judges, wherever was
             flown.
         flight: How a vehicle is flown; its folder is the run folder.
+        earlier: Run folders whose flights the learners are told first (`ivl.learning.earlier`), the earliest first;
+            a run that is resumed has its own copy of them.
 
     Raises:
+        ConfigError: An earlier run is of another task.
         StoreError: The folder cannot be used, or its run is of another configuration.
         RolloutError: Flying failed; the run can be resumed.
         LinkError: The vehicle at the end of the link cannot be reached.
     """
     hooks = hooks or Hooks()
-    world = chosen.make_world()
+    worlds = chosen.trial_worlds(n_trials or 1)
     packed, copies = references.pack(chosen)
-    manifest = make_manifest(packed, world, n_trials, uri)
+    each = n_trials is not None and chosen.family.is_each
+    files_world = chosen.nominal_world_of(chosen.gear) if each else worlds[0]
+    manifest = make_manifest(packed, files_world, n_trials, uri)
+    if earlier and resume and (folder / "manifest.json").exists():
+        raise ConfigError(f"--from: {folder} is resumed with the flights that it began with: leave it out")
+    told = gather([_read_run(run) for run in earlier], chosen, uri, each) if earlier else _kept_earlier(folder, resume)
+    if told is not None:
+        content = told.to_bytes()
+        copies = copies | {EARLIER_FILE: content}
+        manifest["earlier"] = {"runs": list(told.runs), "sha256": hashlib.sha256(content).hexdigest()}
     with ExitStack() as stack:
         simulator, notes = _simulator(chosen, threads, hooks)
-        if simulator is not None and uri is not None:
-            notes.append("the belief learned from outcomes alone: no recordings come over a link yet")
-        source = _open_source(uri, chosen, world, threads, folder, flight, simulator is not None)
+        notes += [] if told is None else told.notes
+        if hooks.on_note:
+            for note in notes:
+                hooks.on_note(note)
+        source = _open_source(
+            uri, chosen, worlds if each else worlds[0], threads, folder, flight, simulator is not None
+        )
         stack.callback(source.close)
         store = stack.enter_context(_open(folder, packed, copies, manifest, resume))
         if hooks.on_start:
             hooks.on_start(folder)
-        LearningRun(trials_of(chosen, n_trials or 1), source, store, simulator).run(hooks.on_episode)
+        n_thinking = 1 if simulator is None else threads or len(os.sched_getaffinity(0))
+        learning = LearningRun(trials_of(chosen, n_trials or 1), source, store, simulator, told, n_thinking)
+        learning.run(hooks.on_episode)
         source.close()
-        history, rollouts = store.episodes(), store.rollouts()
-        best = _best(folder, world, chosen, threads, hooks)
-        verdicts = assess.judge(world, chosen, best, history, rollouts, threads)
-        summary = assess.summarise(verdicts) if n_trials else _summary_of_one(verdicts[0], history, rollouts)
-        n_discarded = int((rollouts.status == DISCARDED).sum())
+        flown = _Flown(chosen, worlds, each, store.episodes(), store.rollouts(), threads)
+        bests, verdicts, summary = _judge(flown, folder, n_trials, hooks)
         summary |= {
             "run_dir": str(folder),
             "learner": chosen.learner.name,
-            "best": asdict(best),
-            "discarded": n_discarded,
+            "earlier": None if told is None else {"runs": list(told.runs), "rollouts": len(told.theta)},
+            "discarded": int((flown.rollouts.status == DISCARDED).sum()),
             "warnings": [*notes, *source.warnings],
         }
         write_json(folder / "result.json", {**summary, "verdicts": [asdict(v) for v in verdicts]})
-    return RunResult(folder, chosen, world, best, verdicts, history, rollouts, summary)
+    return RunResult(folder, chosen, worlds[0], bests[0], verdicts, flown.history, flown.rollouts, summary)
+
+
+@dataclass(frozen=True)
+class _Flown:
+    """All that was flown, and where; `each`: trial k in `worlds[k]`, else all in the only one."""
+
+    chosen: Experiment
+    worlds: list[World]
+    each: bool
+    history: list[EpisodeRow]
+    rollouts: RolloutRows
+    threads: int | None
+
+    def last(self, trial: int) -> EpisodeRow:
+        """The last episode of a trial."""
+        return max((row for row in self.history if row.trial == trial), key=lambda row: row.episode)
+
+    def fits(self) -> list[bool | None]:
+        """Whether the learner's model fits, of each trial; None: it has none."""
+        insights = [self.last(trial).insight for trial in range(1 + max(row.trial for row in self.history))]
+        return [None if insight is None else bool(insight["model_fits"]) for insight in insights]
+
+
+def _judge(
+    flown: _Flown, folder: Path, n_trials: int | None, hooks: Hooks
+) -> tuple[list[assess.Best], list[assess.Verdict], dict[str, Any]]:
+    """The best possible policies, a verdict for each trial, and the summary."""
+    chosen, worlds, threads = flown.chosen, flown.worlds, flown.threads
+    bests = _bests(flown, folder, hooks)
+    if flown.each:
+        verdicts = assess.judge_each(worlds, chosen, bests, flown.history, flown.rollouts, threads)
+        summary = assess.summarise_each(verdicts, bests, flown.rollouts, flown.fits())
+        summary |= {"margin_rate": _margin_rates(flown, bests), "best": [asdict(best) for best in bests]}
+        return bests, verdicts, summary
+    verdicts = assess.judge(worlds[0], chosen, bests[0], flown.history, flown.rollouts, threads)
+    if n_trials:
+        summary = assess.summarise(verdicts)
+    else:
+        summary = _summary_of_one(verdicts[0], flown.history, flown.rollouts)
+        recommended = np.array(flown.last(0).recommended)
+        summary |= {
+            "model_fits": flown.fits()[0],
+            "margin": margin.report(worlds[0], chosen, recommended, threads),
+        }
+    return bests, verdicts, {**summary, "best": asdict(bests[0])}
+
+
+def _margin_rates(flown: _Flown, bests: list[assess.Best]) -> dict[str, float] | None:
+    """Margin rates of the recommendations, each on its own vehicle, and that as a share of the largest one there."""
+    if not assess.has_margin(flown.chosen):
+        return None
+    n_each = margin.scaled(flown.chosen, _N_MARGIN)
+    rates = [
+        assess.margin_rates(world, flown.chosen, np.array([flown.last(k).recommended]), n_each, flown.threads)[0]
+        for k, world in enumerate(flown.worlds)
+    ]
+    shares = [
+        rate / best.largest_margin_rate for rate, best in zip(rates, bests, strict=True) if best.largest_margin_rate
+    ]
+    share = {"share_of_largest": float(np.mean(shares))} if shares else {}
+    return {"mean": float(np.mean(rates)), **share}
 
 
 def _open_source(
     uri: str | None,
     chosen: Experiment,
-    world: World,
+    where: World | list[World],
     threads: int | None,
     folder: Path,
     flight: Options | None,
     record: bool,
 ) -> RolloutSource:
+    if isinstance(where, list):
+        if uri is None:
+            return TrialSource(where, chosen, threads, record)
+        each = f"{family.MEMBER}: {family.EACH}"
+        raise ConfigError(f"{each}: {uri} flies one vehicle: name a member, or leave out --trials")
     if uri is None:
-        return WorldSource(world, chosen, threads, record)
-    return links.open_source(uri, chosen, threads, replace(flight or Options(), folder=folder))
+        return WorldSource(where, chosen, threads, record)
+    return links.open_source(uri, chosen, threads, replace(flight or Options(), folder=folder), record)
 
 
 def _simulator(chosen: Experiment, threads: int | None, hooks: Hooks) -> tuple[Simulator | None, list[str]]:
@@ -163,6 +254,32 @@ def _simulator(chosen: Experiment, threads: int | None, hooks: Hooks) -> tuple[S
         return None, ["learned from flights alone: no parameter of the vehicle has a sigma"]
     kin = family.of(home, chosen.family)
     return Simulator.of(kin, chosen.flight, threads=threads, progress=hooks.on_bank), []
+
+
+def _kept_earlier(folder: Path, resume: bool) -> Earlier | None:
+    """The flights of earlier runs with which a run that is resumed began."""
+    kept = read_manifest(folder).get("earlier") if resume and (folder / "manifest.json").exists() else None
+    if kept is None:
+        return None
+    path = folder / EARLIER_FILE
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {files.reason(error)}") from error
+    if hashlib.sha256(content).hexdigest() != kept["sha256"]:
+        raise StoreError(f"{path}: is not as it was written")
+    return Earlier.of_bytes(content)
+
+
+def _read_run(folder: Path) -> EarlierRun:
+    """An earlier run."""
+    if folder.is_file():
+        raise ConfigError(
+            f"--from {folder}: is a file: name a run folder (--policy FILE begins with a policy's numbers)"
+        )
+    experiment, n_trials = read_config(folder)
+    with RunStore.open_reading(folder, native.library().outcome_dtype) as store:
+        return EarlierRun(folder, experiment, n_trials, read_manifest(folder).get("uri"), store.rollouts())
 
 
 def read_config(folder: Path) -> tuple[Experiment, int | None]:
@@ -292,15 +409,21 @@ def _difference(folder: Path, key: str, old: dict[str, Any], new: dict[str, Any]
     return f"the {what} changed since it began, so its rollouts would not continue bit for bit"
 
 
-def _best(folder: Path, world: World, chosen: Experiment, threads: int | None, hooks: Hooks) -> assess.Best:
-    """The best possible policy, from the run folder if it was found before."""
-    path = folder / "best.json"
-    if path.exists():
-        data = json.loads(path.read_text(encoding="utf-8"))
-        return assess.Best(**{**data, "theta": tuple(data["theta"])})
-    best = assess.find_best(world, chosen, threads, hooks.on_stage)
-    write_json(path, asdict(best))
-    return best
+def _bests(flown: _Flown, folder: Path, hooks: Hooks) -> list[assess.Best]:
+    """The best possible policy of each world, from the run folder if it was found before.
+
+    The file holds one object, or a list of them where trials have vehicles of their own; each is kept when it is found.
+    """
+    path, worlds, each = folder / "best.json", flown.worlds, flown.each
+    data = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
+    bests = [assess.Best.of_dict(entry) for entry in (data if isinstance(data, list) else [data])]
+    for trial in range(len(bests), len(worlds)):
+        if each and hooks.on_drone:
+            hooks.on_drone(trial, len(worlds))
+        on_stage = None if each else hooks.on_stage
+        bests.append(assess.find_best(worlds[trial], flown.chosen.trial(trial), flown.threads, on_stage))
+        write_json(path, [asdict(best) for best in bests] if each else asdict(bests[0]))
+    return bests
 
 
 def _summary_of_one(verdict: assess.Verdict, history: list[EpisodeRow], rollouts: RolloutRows) -> dict[str, Any]:

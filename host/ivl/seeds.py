@@ -21,6 +21,7 @@ class Purpose(IntEnum):
     ASSESS = 10
     FAMILY = 11
     FAMILY_ASSESS = 12
+    MARGIN = 13
 
 
 def derive(seed: int, purpose: Purpose) -> int:

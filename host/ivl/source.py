@@ -1,7 +1,10 @@
 """Where rollouts come from: the loop asks a `RolloutSource` and does not know whether it simulates or flies."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -99,6 +102,35 @@ class WorldSource:
         flight = self._experiment.flight
         flown = zip(plan.theta, plan.seed.tolist(), plan.stream.tolist(), strict=True)
         return np.array([simulated(self.world, flight, theta, seed, stream)[0] for theta, seed, stream in flown])
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+class TrialSource:
+    """The simulator in this process, in which every trial has a vehicle of its own."""
+
+    def __init__(
+        self, worlds: Sequence[World], experiment: Experiment, threads: int | None = None, record: bool = False
+    ) -> None:
+        """Fly the experiment's approach, trial k in `worlds[k]`; `record`: give what each flip recorded, too."""
+        self._sources = [WorldSource(world, experiment, 1, record) for world in worlds]
+        self._threads = threads or len(os.sched_getaffinity(0))
+        self.warnings: list[str] = []
+
+    def fly(self, plan: Plan) -> Iterator[Flown]:
+        """Fly the plan; one portion for each trial with everything, and one with what came to no end."""
+        assert plan.trial is not None
+        rows = [np.flatnonzero(plan.trial == trial) for trial in np.unique(plan.trial)]
+        with ThreadPoolExecutor(self._threads) as pool:
+            for own, flown in zip(rows, pool.map(partial(self._fly, plan), rows), strict=True):
+                yield from (replace(portion, index=own[portion.index]) for portion in flown)
+
+    def _fly(self, plan: Plan, own: npt.NDArray[np.intp]) -> list[Flown]:
+        """Some rows of a plan, all of one trial."""
+        assert plan.trial is not None
+        source = self._sources[int(plan.trial[own[0]])]
+        return list(source.fly(Plan(plan.theta[own], plan.seed[own], plan.stream[own])))
 
     def close(self) -> None:
         """Nothing to give back."""

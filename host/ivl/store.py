@@ -5,6 +5,7 @@
     run.sqlite      rollouts, episodes, learner states, what the columns of policy and reward mean, and seals: digests
                     of finished episodes and learner states, so that a damaged number is found and not read
     files/          copies of the files that the configuration names
+    earlier.npz     flights of earlier runs that the learner was told first, if any
 
 SQLite in WAL mode with synchronous=FULL: a commit is on the disk when it returns, and a transaction is there whole or
 not at all. An episode passes three commits: *planned* (policies and the learners' states after `ask`), *scored* (each
@@ -40,7 +41,8 @@ from ivl.outcome import Outcomes
 from ivl.quantity import Quantity
 from ivl.rewards.base import TOTAL, Terms
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
+EARLIER_FILE = "earlier.npz"
 
 _ROLLOUT_KEY = "trial INTEGER, episode INTEGER, idx INTEGER"
 _SEARCH = ("mu", "sigma", "recommended")
@@ -55,7 +57,13 @@ _SQLITE_ADVICE = {
     sqlite3.SQLITE_CORRUPT: "the file is damaged",
     sqlite3.SQLITE_NOTADB: "the file is damaged",
 }
-_EPISODE_FIGURES = {"reward_mean": "REAL", "rate_four_leg": "REAL", "rate_clean": "REAL", "stopped": "INTEGER"}
+_EPISODE_FIGURES = {
+    "reward_mean": "REAL",
+    "rate_four_leg": "REAL",
+    "rate_clean": "REAL",
+    "stopped": "INTEGER",
+    "insight": "TEXT",
+}
 
 
 class RunStore:
@@ -236,7 +244,7 @@ class RunStore:
         """Commit one episode of some trials: its figures and the learners' states after `tell`, in one transaction."""
         values = [
             (r.trial, r.episode, r.n_scored, *r.mu, *r.sigma, *r.recommended,
-             *map(_to_sql, (r.reward_mean, r.rate_four_leg, r.rate_clean)), int(r.stopped))
+             *map(_to_sql, (r.reward_mean, r.rate_four_leg, r.rate_clean)), int(r.stopped), _insight_text(r))
             for r in rows
         ]  # fmt: skip
         with self._transaction():
@@ -506,6 +514,10 @@ def _recording_text(row: npt.NDArray[np.float64]) -> str:
     return json.dumps([_to_sql(value) for value in row.tolist()])
 
 
+def _insight_text(row: EpisodeRow) -> str | None:
+    return None if row.insight is None else json.dumps(row.insight, allow_nan=False)
+
+
 def _recordings(texts: Sequence[str | None]) -> npt.NDArray[np.float64] | None:
     """Inverse of `_recording_text` for many; None if there is none at all."""
     rows = [None if text is None else json.loads(text) for text in texts]
@@ -531,11 +543,12 @@ def _marks(columns: Collection[str]) -> str:
 def _episode_row(row: tuple[Any, ...], dim: int) -> EpisodeRow:
     trial, episode, n_scored, *rest = row
     mu, sigma, recommended = (tuple(rest[first : first + dim]) for first in range(0, 3 * dim, dim))
-    *figures, stopped = rest[3 * dim :]
+    *figures, stopped, insight = rest[3 * dim :]
     reward_mean, rate_four_leg, rate_clean = map(_from_sql, figures)
     return EpisodeRow(
-        trial, episode, n_scored, mu, sigma, recommended, reward_mean, rate_four_leg, rate_clean, bool(stopped)
-    )
+        trial, episode, n_scored, mu, sigma, recommended, reward_mean, rate_four_leg, rate_clean, bool(stopped),
+        None if insight is None else json.loads(insight),
+    )  # fmt: skip
 
 
 def lock_folder(folder: Path) -> int:
@@ -565,6 +578,7 @@ def _clear_unfinished(folder: Path) -> None:
         "run.sqlite-shm",
         "config.yaml",
         "lock",
+        EARLIER_FILE,
         references.FOLDER,  # its files have names that follow from their content
     }
     if (folder / "manifest.json").exists():

@@ -21,6 +21,8 @@ from ivl.family import Family, FamilyChoice, Spread
 from ivl.learners import EpheBelief, make_learner
 from ivl.learners.base import LANDED, RECORDING
 from ivl.outcome import four_leg
+from ivl.plots import belief as belief_picture
+from ivl.report import learn_page
 from ivl.world import World
 
 BOUNDS = np.array([[0.0, 7.0], [0.0, 10.65]])
@@ -499,16 +501,60 @@ def test_a_run_keeps_recordings_and_continues_with_the_same_bits(small: experime
     resumed = run.run(small, tmp_path / "cut", resume=True)
     assert (resumed.rollouts.theta == whole.rollouts.theta).all()
     assert resumed.history == whole.history
+    check_what_is_told(whole)
+    earlier = run.run(small.model_copy(update={"budget": 4}), tmp_path / "later", earlier=[whole.folder])
+    expected = [row.insight["expected_rate"] for row in (whole.history[-1], earlier.history[0]) if row.insight]
+    assert abs(expected[0] - expected[1]) < 0.5
+    assert earlier.history[0].insight is not None
+    assert earlier.history[0].insight["belief"]["quantiles"] != whole.history[0].insight["belief"]["quantiles"]
+
+
+def check_what_is_told(whole: run.RunResult) -> None:
+    """What a run with a belief says: in its summary, on its page, in its picture."""
+    insights = [row.insight or {} for row in whole.history]
+    assert whole.summary["model_fits"] is insights[-1]["model_fits"]
+    assert all(0.0 <= insight["margin_rate"] <= 1.0 and 0.0 <= insight["expected_rate"] <= 1.0 for insight in insights)
+    told = insights[-1]["belief"]
+    prior, after = np.array(told["prior"]), np.array(told["quantiles"])
+    assert prior.shape == after.shape == (len(told["names"]), 5)
+    assert (np.diff(after, axis=1) >= 0.0).all()
+    assert np.abs(after - prior).max() > 0.0
+    predicted = insights[-1]["predicted"]
+    assert predicted["names"] == list(emulator.USED)
+    assert (np.array(predicted["sd"]) > 0.0).all()
+    assert [path.name for path in belief_picture.draw_run(whole)] == ["belief.png", "belief.svg"]
+    data, _ = learn_page.collect(whole.folder, 2, lambda _done, _all: None)
+    (picture,) = data["learn"]["pictures"]
+    assert picture["source"].startswith("data:image/png;base64,")
+    facts = dict(map(tuple, data["facts"]))
+    assert facts["Its margin rate"].startswith(f"{100 * whole.summary['margin']['rate']:.1f} %")
+    assert facts["Model"]
+
+
+def test_the_parameters_that_changed_most_are_drawn() -> None:
+    before = np.tile([-2.0, -1.0, 0.0, 1.0, 2.0], (9, 1))
+    after = before.copy()
+    after[3] += 5.0
+    after[7] *= 0.1
+    assert belief_picture.most_changed(np.array([before, after]))[:2] == [3, 7]
+    assert len(belief_picture.most_changed(np.array([before, after]))) == 6
+
+
+def test_failures_that_are_expected_are_those_of_the_flights_that_are_left() -> None:
+    found = belief_picture.expected_failures(np.array([0.5, 0.9, 1.0]), np.array([4, 14, 16]), 24)
+    assert found == pytest.approx([10.0, 1.0, 0.0])
 
 
 def test_a_run_says_why_it_learns_without_simulated_vehicles(small: experiment.Experiment, tmp_path: Path) -> None:
-    bare = small.model_copy(update={"vehicle": "habas2021", "gear_set": "as_simulated"})
+    changed = {"vehicle": "habas2021", "gear_set": "as_simulated", "family": FamilyChoice()}
+    bare = small.model_copy(update=changed)
     assert "no parameter of the vehicle has a sigma" in " ".join(run.run(bare, tmp_path / "bare").summary["warnings"])
 
 
 def test_the_tool_that_judges_transfer_tells_its_figures() -> None:
     tool = Path(__file__).parents[2] / "tools" / "transfer.py"
     options = ["--drones", "2", "--flights", "2", "--learner", "ephe_robust", "--workers", "1"]
+    options += ["--set", "check.effort=0.02", "--set", "check.n_fresh=20", "--scale", "2", "--set", "start=imparted"]
     done = subprocess.run([sys.executable, str(tool), *options], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "ephe_robust: 2 drones, best policies land" in done.stdout

@@ -348,7 +348,7 @@ def test_a_setting_reaches_into_the_section_by_the_name_of_a_parameter() -> None
     assert chosen.family.scale == 2.0
     assert chosen.family.known == ["aero.*"]
     assert chosen.family.parameters["body.mass"].share == 0.1
-    assert landing.of_rollout(chosen, 0, (4.0, 8.0), 0).family == chosen.family
+    assert landing.of_rollout(chosen, 0, (4.0, 8.0), 0).family == chosen.trial(0).family
     with pytest.raises(ConfigError, match=r"transfer\.yaml: family\.scal: unknown key, did you mean 'family\.scale'"):
         experiment.load(TRANSFER, ["family.scal=2.0"])
     with pytest.raises(ConfigError, match=r"transfer\.yaml: family\.known: bdy\.\*: unknown parameter"):
@@ -356,13 +356,16 @@ def test_a_setting_reaches_into_the_section_by_the_name_of_a_parameter() -> None
 
 
 def test_the_family_changes_nothing_of_the_world_that_is_flown() -> None:
-    worlds = [experiment.load(TRANSFER, s).make_world() for s in ([], ["family.scale=3.0"])]
-    assert worlds[0].params == worlds[1].params == experiment.load("experiments/paper_flight.yaml").make_world().params
+    choices = [experiment.load(TRANSFER, ["family.member=null", *s]) for s in ([], ["family.scale=3.0"])]
+    worlds = [chosen.make_world() for chosen in choices]
+    paper = experiment.load("experiments/paper_flight.yaml")
+    assert worlds[0].params == worlds[1].params == paper.make_world().params
+    assert choices[0].family == paper.family
 
 
 def test_the_family_of_transfer_is_what_is_drawn() -> None:
     chosen = experiment.load(TRANSFER)
-    kin = family.of(chosen.make_world(), chosen.family)
+    kin = family.of(chosen.nominal_world_of(chosen.gear), chosen.family)
     assert set(kin.names) == set(chosen.family.parameters)
     assert kin.sample(20, 0).share_refused < 0.2
 
@@ -385,7 +388,7 @@ def shown(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]
 def test_family_show_tells_what_is_drawn_and_draws_it(capsys: pytest.CaptureFixture[str]) -> None:
     found = shown(capsys, TRANSFER, "--set", "family.scale=2.0", "--members", "4", "--seed", "3")
     chosen = experiment.load(TRANSFER, ["family.scale=2.0"])
-    kin = family.of(chosen.make_world(), chosen.family)
+    kin = family.of(chosen.nominal_world_of(chosen.gear), chosen.family)
     sample = kin.sample(4, 3)
     assert list(found["parameters"]) == list(kin.names)
     assert found["parameters"]["body.mass"]["sigma"] == pytest.approx(2 * 0.03 * 0.0343)
@@ -441,7 +444,8 @@ def test_family_show_says_what_is_wrong_in_one_line(
 def test_a_task_flies_the_member_that_it_names(capsys: pytest.CaptureFixture[str]) -> None:
     settings = ["family.member=2", "family.seed=4"]
     chosen = experiment.load(TRANSFER, settings)
-    nominal = experiment.load(TRANSFER).make_world()
+    nominal = chosen.nominal_world_of(chosen.gear)
+    assert nominal.params == experiment.load("experiments/paper_flight.yaml").make_world().params
     expected = family.members(nominal, 3, 4, chosen.family)[2]
     assert chosen.make_world().params.digest() == expected.params.digest() != nominal.params.digest()
     assert chosen.nominal_world_of(chosen.gear).params == nominal.params
@@ -451,5 +455,5 @@ def test_a_task_flies_the_member_that_it_names(capsys: pytest.CaptureFixture[str
     assert {name: values[2] for name, values in told["values"].items()} == {
         name: expected.params.values[name] for name in told["values"]
     }
-    with pytest.raises(ConfigError, match=r"family\.member: value 10000: .*less than 10000"):
+    with pytest.raises(ConfigError, match=r"family\.member: value 10000: .*allowed 0 \.\. 9999"):
         experiment.load(TRANSFER, ["family.member=10000"])

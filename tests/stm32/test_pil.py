@@ -87,6 +87,19 @@ def _learn(chosen, source, folder):
         return store.episodes(), store.rollouts()
 
 
+def test_a_flip_is_recorded_as_in_process() -> None:
+    chosen = experiment.load("experiments/paper_flight.yaml", learner="ephe_robust")
+    theta = np.array([[4.0, 8.0], [4.3, 9.0]])
+    plan = Plan(theta, np.array([1, 2**40], dtype=np.uint64), np.array([0, 9], dtype=np.uint64))
+    there = list(open_source("pil://", chosen, record=True).fly(plan))
+    here = list(WorldSource(chosen.make_world(), chosen, record=True).fly(plan))
+    assert there[0].recordings is not None
+    assert here[0].recordings is not None
+    assert np.isfinite(here[0].recordings).any(axis=1).all()
+    assert there[0].recordings.tobytes() == here[0].recordings.tobytes()
+    assert next(open_source("pil://", chosen).fly(plan)).recordings is None
+
+
 def test_uri_may_name_another_image(tmp_path: Path) -> None:
     image = tmp_path / "other.elf"
     image.write_bytes(pil.IMAGE.read_bytes())

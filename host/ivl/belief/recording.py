@@ -1,4 +1,4 @@
-"""What a flight records of its flip, as a vector of features.
+"""What a flight records of its flip, as a vector of features: in simulation (`simulated`), or by its recorder.
 
     pitch, rate, fall     at `TIMES_S` after the trigger, up to the first contact
     at_contact            time after the trigger, pitch, rate and fall at the first contact
@@ -25,6 +25,7 @@ from ivl.outcome import Outcomes
 from ivl.world import Trace, World
 
 FloatArray = npt.NDArray[np.float64]
+Rows = npt.NDArray[np.void]
 
 TIMES_S = np.arange(0.03, 0.231, 0.02)
 SIGNALS = ("pitch", "rate", "fall")
@@ -46,6 +47,8 @@ _GYRO_FULL_RADPS = 34.9
 """Full scale of the gyro (Bosch BMI088 data sheet); rates are compared up to `_CLIP_SHARE` of it."""
 _CLIP_SHARE = 0.93
 _OVERSHOOT_MAX = 0.1
+_NOTICED_LATE_S = 0.03
+"""An accelerometer notices the first touch of a leg up to this late (docs/HOST.md)."""
 _ATTITUDE_DEG, _CONTACT_S, _BATTERY_V = 0.3, 0.002, 0.01
 """Assumed errors of a recorded attitude, of the time of the first contact as a recorder at 500 Hz gives it, and of a
 voltage that was averaged over a hover."""
@@ -113,6 +116,59 @@ def of_trace(world: World, trace: Trace, threshold_per_s: float, rng: np.random.
     overshoot = float(outcome["rrev_trigger"]) / threshold_per_s - 1.0 if threshold_per_s > 0.0 else np.nan
     crossed = abs(overshoot) < _OVERSHOOT_MAX  # else the approach began above the threshold
     return _features(t_s, pitch, rate, distance, closing, contact_s, (battery_V, overshoot if crossed else np.nan))
+
+
+def of_recorder(
+    world: World,
+    rows: Rows,
+    trigger_row: int | None,
+    outcome: Outcomes,
+    threshold_per_s: float,
+    battery_V: float = np.nan,
+    contact_is_seen: bool = True,
+) -> FloatArray:
+    """Features of a flight that a flight recorder kept, shape (N,).
+
+    The recorder has what the flight core was told: poses as late as they came, rates of the gyro. So nothing is added.
+
+    Args:
+        world: Whose surface is landed on.
+        rows: Rows of the recorder (`ivl.links.packets.Recording`), in SI units.
+        trigger_row: Row of the trigger; None: it did not fire.
+        outcome: Outcome of the flight, shape (1,).
+        threshold_per_s: RREV_c of the policy; 0 is unknown.
+        battery_V: Voltage in the hover before the approach; NaN is unknown.
+        contact_is_seen: Whether the outcome tells when the first leg touched. If it tells only when the accelerometer
+            noticed, nothing is taken of the contact, and nothing of the time shortly before it.
+    """
+    if trigger_row is None or not outcome["triggered"][0]:
+        return np.full(N, np.nan)
+    t_s = rows["t_s"] - rows["t_s"][trigger_row]
+    pitch = pitch_deg(rows["q_WB"])
+    pitch = pitch - 360.0 * np.round(pitch[trigger_row] / 360.0)
+    gap_m = world.surface.gap_m(rows["p_W_m"]) + world.params.values["world.sensed_gap_offset"]
+    distance = _between_poses(t_s, gap_m)
+    closing = rows["v_W_mps"] @ np.asarray(world.surface.normal_W)
+    contact_s = float(outcome["t_impact_s"][0]) - float(outcome["t_trigger_s"][0])
+    overshoot = float(outcome["rrev_trigger"][0]) / threshold_per_s - 1.0 if threshold_per_s > 0.0 else np.nan
+    conditions = battery_V, overshoot if abs(overshoot) < _OVERSHOOT_MAX else np.nan
+    end_s = contact_s if contact_is_seen else contact_s - _NOTICED_LATE_S
+    features = _features(t_s, pitch, -rows["w_B_radps"][:, 1], distance, closing, end_s, conditions)
+    if not contact_is_seen:
+        features[[NAMES.index(name) for name in AT_CONTACT]] = np.nan
+    return features
+
+
+def _between_poses(t_s: FloatArray, held: FloatArray) -> FloatArray:
+    """A signal that holds its last value from pose to pose, interpolated between the poses; both have shape (n,)."""
+    fresh = np.flatnonzero(np.concatenate([[True], np.diff(held) != 0.0]))
+    return np.interp(t_s, t_s[fresh], held[fresh])
+
+
+def pitch_deg(q_WB: FloatArray) -> FloatArray:
+    """Nose-up rotation about b_y, unwrapped along the rows, degrees; q_WB has shape (n, 4), x y z w."""
+    x, y, z, w = q_WB.T
+    return np.asarray(np.degrees(np.unwrap(np.arctan2(2.0 * (x * z - w * y), 1.0 - 2.0 * (y * y + z * z)))))
 
 
 def _features(

@@ -5,6 +5,7 @@ Both consoles print text as it is: no path, name or message of a user is markup.
 """
 
 import json
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ out = Console(**_LITERAL)
 err = Console(stderr=True, **_LITERAL)
 
 _SHOWN_MAX = 4  # parameters in a line of progress
+MODEL_FITS = {True: "model fits", False: "NO MODEL FITS", None: "no model"}
+"""Words for `ivl.learners.base.Learner.insight`'s `model_fits`."""
 
 
 def say(text: str) -> None:
@@ -32,7 +35,7 @@ def print_json(data: dict[str, Any]) -> None:
 
 
 def print_episode(progress: Progress, form: Form) -> None:
-    """One line of live progress: episode, mu +- sigma of the first parameters, landing rate, rollouts per second."""
+    """One line of live progress: episode, mu +- sigma of the first parameters, landing rate, what is expected."""
     mu = np.mean([row.mu for row in progress.rows], axis=0)
     sigma = np.mean([row.sigma for row in progress.rows], axis=0)
     policy = Text("  ").join(
@@ -43,8 +46,19 @@ def print_episode(progress: Progress, form: Form) -> None:
     rate = f"{100 * progress.rate_recent:3.0f} %" if np.isfinite(progress.rate_recent) else "  - "
     trials = f"  (mean of {len(progress.rows)} trials)" if len(progress.rows) > 1 else ""
     before = f"episode {progress.episode:3d}/{progress.n_episodes}  "
-    after = f"  landing rate {rate}  {progress.rollouts_per_s:7.0f} rollouts/s{trials}"
+    expected = _expected([row.insight for row in progress.rows if row.insight is not None])
+    after = f"  landing rate {rate}{expected or f'  {progress.rollouts_per_s:7.0f} rollouts/s'}{trials}"
     err.print(Text.assemble(before, policy, after))
+
+
+def _expected(insights: Sequence[Mapping[str, Any]]) -> str:
+    """What learners expect of their recommendations, mean over the trials; empty if none expects anything."""
+    if not insights:
+        return ""
+    expected, margin = (np.mean([insight[name] for insight in insights]) for name in ("expected_rate", "margin_rate"))
+    n_fit = sum(insight["model_fits"] for insight in insights)
+    fits = f"model fits {n_fit} of {len(insights)}" if len(insights) > 1 else MODEL_FITS[bool(n_fit)]
+    return f"  expected {100 * expected:3.0f} %, with margin {100 * margin:3.0f} %, {fits}"
 
 
 def number(value: float | None, digits: int = 2) -> str:

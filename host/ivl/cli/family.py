@@ -43,7 +43,10 @@ and replaces it:
       - {of: [rotor.tau_up, rotor.tau_down], value: 0.8, source: "the same motors"}
     scale: 1.0                                              factor on all spreads
     seed: 0                                                 of the members
-    member: null                                            fly this one, 0 or more; null: the vehicle of the files
+    member: null                                            fly this one, 0 or more; null: the vehicle of the files;
+                                                            each: trial k of ivl learn --trials N flies member k
+    member_scale: 1.0                                       factor on the spread of the members that fly, not of the
+                                                            family that a learner is told
 
 A parameter that --set gives a value is known, and is not drawn.
 

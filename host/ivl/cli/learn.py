@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ivl import experiment, run
+from ivl import experiment, margin, run
 from ivl.cli import console, policy_options
 from ivl.errors import ConfigError, IvlError
 from ivl.experiment import Experiment
@@ -26,8 +26,12 @@ Examples:
       the paper's vertical landing
   ivl learn experiments/paper_vertical.yaml --learner ephe
       another learner (see: ivl list learners)
-  ivl learn experiments/paper_flight.yaml --learner ephe_belief
-      begin with simulated vehicles: the first flights land
+  ivl learn experiments/paper_flight.yaml
+      the paper's flown experiment, beginning with simulated vehicles: the first flights land
+  ivl learn experiments/paper_flight.yaml --learner bo --set n_rollouts=8 --set budget=160
+      the same by a learner that begins with nothing
+  ivl learn experiments/transfer.yaml --trials 60 --json
+      how soon sixty vehicles are learned that were never simulated exactly, and with how many failures
   ivl learn experiments/paper_vertical.yaml --set gear_set=table1 --set sense.latency=0.02
       another landing gear, slower sensing
   ivl learn experiments/paper_vertical.yaml --trials 100 --json
@@ -40,7 +44,9 @@ Examples:
   ivl learn experiments/paper_vertical.yaml --uri radio://0/80/2M/E7E7E7E7E7 --mocap lab.yaml
       the drone, tracked; see docs/HARDWARE.md and docs/HOST.md first
   ivl learn experiments/paper_vertical.yaml --policy g.yaml
-      from a policy for every approach on, for this approach
+      the search begins at the numbers of a policy for every approach
+  ivl learn experiments/paper_flight.yaml --from runs/monday --from runs/tuesday
+      the learner is told first what earlier runs of the same task flew
   ivl learn --resume --out runs/mine
       go on after Ctrl-C, kill -9 or power loss
 """
@@ -63,6 +69,10 @@ def learn(
     policy_file: Annotated[
         Path | None, typer.Option("--policy", metavar="FILE", help="Begin the search with the numbers of a policy.")
     ] = None,
+    earlier: Annotated[
+        list[Path] | None,
+        typer.Option("--from", metavar="RUN", help="Tell the learner first what an earlier run flew; may be repeated."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default: a new one under runs/.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was cut off.")] = False,
     uri: Annotated[
@@ -81,7 +91,7 @@ def learn(
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume)
     folder = out or run.default_folder(chosen, n_trials, resume)
-    hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage, _bank)
+    hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage, _bank, _drone, _note)
     flight = Options(
         mocap=mocap_config.load(mocap) if mocap else None,
         other_world=other_world,
@@ -89,7 +99,7 @@ def learn(
         say=console.say,
     )
     try:
-        result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight)
+        result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight, earlier or [])
     except KeyboardInterrupt:
         words = ["ivl", "learn", "--resume", "--out", str(folder)]
         words += [*(("--uri", uri) if uri else ()), *(("--mocap", mocap) if mocap else ())]
@@ -140,6 +150,14 @@ def _stage(stage: int, n_stages: int) -> None:
     console.err.print(f"judging: best possible policy, stage {stage + 1} of {n_stages}")
 
 
+def _drone(trial: int, n_trials: int) -> None:
+    console.err.print(f"judging: best possible policy of vehicle {trial + 1} of {n_trials}")
+
+
+def _note(text: str) -> None:
+    console.err.print(f"note: {text}")
+
+
 def _bank(done: int, n: int) -> None:
     if done == n or done % max(n // 10, 1) == 0:
         console.err.print(f"simulated vehicles: {done} of {n}")
@@ -149,9 +167,10 @@ def _draw(result: run.RunResult) -> tuple[list[Path], IvlError | None]:
     """Pictures of a single run, and why they are not all there; the result is told before that is."""
     pictures: list[Path] = []
     try:
-        from ivl.plots import convergence, strobe  # matplotlib takes a second to load
+        from ivl.plots import belief, convergence, strobe  # matplotlib takes a second to load
 
         pictures += convergence.draw_run(result)
+        pictures += belief.draw_run(result)
         pictures += strobe.draw_last_landing(result)
     except Exception as error:  # noqa: BLE001 - whatever a picture raises, it is reported after the result
         what = str(error) if isinstance(error, IvlError) else f"{type(error).__name__}: {error}"
@@ -161,12 +180,15 @@ def _draw(result: run.RunResult) -> tuple[list[Path], IvlError | None]:
 
 def _report(result: run.RunResult, pictures: list[Path]) -> None:
     summary, best = result.summary, result.best
-    lines = _lines_of_trials(summary) if "trials" in summary else _lines_of_one(summary, result.experiment)
-    best_text = (
-        f"{console.percent(best.rate_four_leg)} at {result.experiment.policy.shape.describe(best.theta)} "
-        f"({best.search})"
-    )
-    lines.append(("best possible policy", best_text))
+    if "flights_to_solved" in summary:
+        lines = _lines_of_drones(summary)
+    else:
+        lines = _lines_of_trials(summary) if "trials" in summary else _lines_of_one(result)
+        best_text = (
+            f"{console.percent(best.rate_four_leg)} at {result.experiment.policy.shape.describe(best.theta)} "
+            f"({best.search})"
+        )
+        lines.append(("best possible policy", best_text))
     if summary["discarded"]:
         lines.append(("discarded rollouts (not learned from)", str(summary["discarded"])))
     lines.extend(("note", text) for text in summary["warnings"])
@@ -176,7 +198,8 @@ def _report(result: run.RunResult, pictures: list[Path]) -> None:
         console.out.print(f"{name:36s} {text}")
 
 
-def _lines_of_one(summary: dict[str, Any], experiment: Experiment) -> list[tuple[str, str]]:
+def _lines_of_one(result: run.RunResult) -> list[tuple[str, str]]:
+    summary, experiment = result.summary, result.experiment
     found = zip(experiment.policy.shape.params, summary["mu"], summary["sigma"], strict=True)
     reached = summary["rollouts_to_convergence"]
     return [
@@ -184,6 +207,8 @@ def _lines_of_one(summary: dict[str, Any], experiment: Experiment) -> list[tuple
         *((p.symbol, f"{mu:.2f} ± {sigma:.2f} {p.unit}") for p, mu, sigma in found),
         ("landing rate, last three episodes", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
         ("of the recommended policy", _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"])),
+        *margin.lines(summary["margin"], result.best, experiment),
+        *([] if summary["model_fits"] is None else [("model", console.MODEL_FITS[summary["model_fits"]])]),
         ("failed landings until convergence", str(summary["failed_landings"])),
         ("failed landings in all", f"{summary['failed_landings_total']} of {summary['rollouts']} rollouts"),
     ]
@@ -199,6 +224,29 @@ def _lines_of_trials(summary: dict[str, Any]) -> list[tuple[str, str]]:
         ("stuck", f"{summary['stuck_trials']} trials"),
         ("recommended policies, mean", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
     ]
+
+
+def _lines_of_drones(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    reached, failed, fits = summary["flights_to_solved"], summary["failed_landings"], summary["model_fits_trials"]
+    beyond, best, room = summary["failed_landings_beyond_best"], summary["best_rate_four_leg"], summary["margin_rate"]
+    lines = [
+        ("solved", f"{summary['solved']} of {summary['trials']} vehicles"),
+        ("flights to solved", f"median {console.number(reached['median'], 0)}, 90 % within "
+                              f"{console.number(reached['p90'], 0)}"),
+        ("failed landings in all flights", f"mean {console.number(failed['mean'], 1)}, 90 % within "
+                                           f"{console.number(failed['p90'], 0)}"),
+        ("beyond those of the best policies", f"mean {console.number(beyond['mean'], 1)}"),
+        ("recommended policies, mean", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
+        ("best possible policies", f"mean {console.percent(best['mean'])}, lowest {console.percent(best['lowest'])}"),
+    ]  # fmt: skip
+    if room is not None:
+        share = console.percent(room.get("share_of_largest"))
+        lines.append(
+            ("margin rate of the recommendations", f"mean {console.percent(room['mean'])}, {share} of the largest")
+        )
+    if fits is not None:
+        lines.append(("model fits", f"{fits['yes']} of {fits['yes'] + fits['no']} vehicles"))
+    return lines
 
 
 def _rates(four: float | None, spotless: float | None) -> str:

@@ -117,6 +117,16 @@ class Learner(ABC):
         mu, sigma = self._distribution()
         return Result(mu.copy(), sigma.copy(), self._recommended().copy(), self._n_told, self._n_updates)
 
+    @property
+    def insight(self) -> dict[str, Any] | None:
+        """What the learner expects, beside where it searches, as plain data; None: it expects nothing.
+
+        Of every learner that has a model of the vehicle: `expected_rate` and `margin_rate`, the landing rates that it
+        expects of its recommendation, without and with errors of timing and moment; `model_fits`, whether flights so
+        far land as often as it expected.
+        """
+        return None
+
     def ask(self, n: int | None = None) -> FloatArray:
         """Draw policies to fly, shape (n, dim), inside the bounds; `n` omitted: `n_rollouts`."""
         n = self.n_rollouts if n is None else n

@@ -29,6 +29,8 @@ from ivl.learners.bo import BOOptions
 from ivl.learners.ephe_memory import EpheMemory, EpheMemoryOptions
 
 _P_MIN = 0.02
+LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Levels of the quantiles in `EpheBelief.insight`."""
 
 
 class EpheBeliefOptions(EpheMemoryOptions):
@@ -62,6 +64,9 @@ class EpheBelief(EpheMemory):
         """Start from simulated vehicles; before the first `ask` or `load_state_dict`."""
         trust = Trust(lapse=self.options.lapse, discrepancy=self.options.discrepancy)
         self._belief = simulator.belief(self._rng, self.options.n_particles, trust)
+        self._simulator = simulator
+        self._at_first = self._quantiles()
+        self._predicted: dict[str, Any] | None = None
         self._normal = (self.mu0, self.sigma0)
         self._decide()
 
@@ -69,6 +74,45 @@ class EpheBelief(EpheMemory):
     def model_fits(self) -> bool | None:
         """Whether flights land as often as the belief expects; None without a belief."""
         return None if self._belief is None else not self.surprise < self.options.alarm
+
+    @property
+    def insight(self) -> dict[str, Any] | None:
+        """See `Learner`; also `surprise`, and what a picture of the belief needs.
+
+        `belief`: `names` and `units` of the family's parameters, their `quantiles` now and in the family (`prior`),
+        shape (n_dimensions, 5) each at `LEVELS`. `predicted`: what was expected of the recording of the flight told
+        last that came first in its episode: `names`, `mean` and `sd` of each feature; None before any flight.
+        """
+        if self._belief is None:
+            return None
+        kin = self._simulator.kin
+        return {
+            "expected_rate": float(decide.rate(self._belief, self._corrected, self._choice[None])[0]),
+            "margin_rate": self._margin_rate,
+            "model_fits": bool(self.model_fits),
+            "surprise": self.surprise,
+            "belief": {
+                "names": list(kin.names),
+                "units": [d.unit for d in kin.dimensions],
+                "prior": self._at_first,
+                "quantiles": self._quantiles(),
+            },
+            "predicted": self._predicted,
+        }
+
+    def _quantiles(self) -> list[list[float]]:
+        """Quantiles of each parameter of the family over the particles."""
+        assert self._belief is not None
+        found = np.quantile(self._simulator.kin.values(self._belief.z), LEVELS, axis=0)
+        return [[float(value) for value in row] for row in found.T]
+
+    def _predict(self, theta: FloatArray, conditions: FloatArray) -> dict[str, Any]:
+        """What a flight of a policy, shape (dim,), is expected to record; its scatter is in the standard deviation."""
+        assert self._belief is not None
+        emulated, n = self._simulator.recordings, len(self._belief.z)
+        expected = emulated.mean(self._belief.z, np.tile(theta, (n, 1)), np.tile(conditions, (n, 1)))
+        sd = np.sqrt(expected.var(axis=0) + np.diag(emulated.within))
+        return {"names": list(emulator.USED), "mean": expected.mean(axis=0).tolist(), "sd": sd.tolist()}
 
     @property
     def surprise(self) -> float:
@@ -107,6 +151,7 @@ class EpheBelief(EpheMemory):
         if LANDED not in meta:
             raise LearnerError(f"tell: meta[{LANDED!r}] is missing: a belief must be told which rollouts landed")
         landed = meta[LANDED].astype(bool)
+        self._predicted = self._predict(theta[0], features[0, recording.CONDITIONS])
         self._foreseen = np.append(self._foreseen, decide.rate(self._belief, self._corrected, theta))
         self._theta = np.vstack([self._theta, theta])
         self._features = np.vstack([self._features, emulator.used(features)])

@@ -7,19 +7,23 @@ recorder before the learners are told.
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ivl.belief.simulator import Simulator
 from ivl.experiment import Experiment
 from ivl.learners import EpheBelief, Learner
-from ivl.learners.base import LANDED, RECORDING, FloatArray
+from ivl.learners.base import FloatArray
+from ivl.learning.earlier import Earlier, meta_of
 from ivl.learning.recorder import PLANNED, SCORED, EpisodeRow, Recorder, RolloutRows
 from ivl.outcome import RECENT_EPISODES, BoolArray, clean, four_leg
 from ivl.seeds import Purpose, derive
 from ivl.source import Plan, RolloutSource
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -44,8 +48,8 @@ class Progress:
 
 
 def trials_of(experiment: Experiment, n_trials: int = 1) -> list[Experiment]:
-    """Trials of one experiment: trial t is the experiment with its seed + t."""
-    return [experiment.model_copy(update={"seed": experiment.seed + trial}) for trial in range(n_trials)]
+    """Trials of one experiment (`Experiment.trial`)."""
+    return [experiment.trial(number) for number in range(n_trials)]
 
 
 class LearningRun:
@@ -57,6 +61,8 @@ class LearningRun:
         source: RolloutSource,
         recorder: Recorder,
         simulator: Simulator | None = None,
+        earlier: Earlier | None = None,
+        threads: int = 1,
     ) -> None:
         """Start, or continue where the recorder stands.
 
@@ -65,15 +71,22 @@ class LearningRun:
             source: Where their rollouts come from.
             recorder: Keeps what they do.
             simulator: Simulated vehicles, for learners that begin with them.
+            earlier: Flights that the learners are told before the first episode.
+            threads: So many learners think at the same time; worth it where each thinks long.
         """
+        self._threads = threads
         self._first, self._source, self._recorder = trials[0], source, recorder
         self._world_seed = np.array([derive(trial.seed, Purpose.WORLD) for trial in trials], dtype=np.uint64)
         self._learners = [trial.make_learner(derive(trial.seed, Purpose.LEARNER)) for trial in trials]
         for learner in self._learners:
             if simulator is not None and isinstance(learner, EpheBelief):
                 learner.begin(simulator)
-        for number, state in recorder.learner_states().items():
-            self._learners[number].load_state_dict(state)
+        states = recorder.learner_states()
+        for number, learner in enumerate(self._learners):
+            if number in states:
+                learner.load_state_dict(states[number])
+            elif earlier is not None:
+                earlier.tell(learner, trials[number])
         self._history: list[EpisodeRow] = recorder.episodes()
         self._n_flown = 0
 
@@ -110,7 +123,7 @@ class LearningRun:
 
     def _plan(self, episode: int, active: list[int]) -> None:
         n = self._first.n_rollouts
-        theta = [self._learners[trial].ask() for trial in active]
+        theta = self._in_turn(lambda trial: self._learners[trial].ask(), active)
         stream = np.arange(episode * n, (episode + 1) * n, dtype=np.uint64)
         self._recorder.plan(episode, active, stream, theta, self._states(active))
 
@@ -135,17 +148,24 @@ class LearningRun:
 
     def _tell(self, episode: int, active: list[int], rollouts: RolloutRows) -> list[EpisodeRow]:
         scored, four, spotless = rollouts.status == SCORED, four_leg(rollouts.outcomes), clean(rollouts.outcomes)
-        rows = []
-        for trial in active:
+
+        def learn(trial: int) -> EpisodeRow:
             chosen = (rollouts.trial == trial) & scored
             outcomes, learner = rollouts.outcomes[chosen], self._learners[trial]
-            meta = {name: outcomes[name] for name in outcomes.dtype.names or ()} | {LANDED: four[chosen]}
-            if rollouts.recordings is not None:
-                meta[RECORDING] = rollouts.recordings[chosen]
+            meta = meta_of(outcomes, None if rollouts.recordings is None else rollouts.recordings[chosen])
             learner.tell(rollouts.theta[chosen], rollouts.reward[chosen], meta)
-            rows.append(_episode_row(trial, episode, learner, rollouts.reward[chosen], four[chosen], spotless[chosen]))
+            return _episode_row(trial, episode, learner, rollouts.reward[chosen], four[chosen], spotless[chosen])
+
+        rows = self._in_turn(learn, active)
         self._recorder.finish_episode(rows, self._states(active))
         return rows
+
+    def _in_turn(self, do: Callable[[int], T], trials: Sequence[int]) -> list[T]:
+        """Let each learner think, in threads if that is worth it; each has random numbers of its own."""
+        if self._threads == 1 or len(trials) == 1:
+            return [do(trial) for trial in trials]
+        with ThreadPoolExecutor(self._threads) as pool:
+            return list(pool.map(do, trials))
 
     def _states(self, trials: Iterable[int]) -> Iterator[dict[str, Any]]:
         return (self._learners[trial].state_dict() for trial in trials)
@@ -179,6 +199,7 @@ def _episode_row(
         rate_four_leg=_mean(four),
         rate_clean=_mean(spotless),
         stopped=learner.stop(),
+        insight=learner.insight,
     )
 
 

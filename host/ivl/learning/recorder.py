@@ -7,7 +7,7 @@ trials at once.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -53,10 +53,23 @@ class RolloutRows:
         """Number of rollouts."""
         return len(self.trial)
 
+    def of_trial(self, number: int) -> "RolloutRows":
+        """Those of one trial."""
+        own = self.trial == number
+        arrays = {
+            field.name: getattr(self, field.name)[own]
+            for field in fields(self)
+            if isinstance(getattr(self, field.name), np.ndarray)
+        }
+        return replace(self, **arrays, terms={name: values[own] for name, values in self.terms.items()})
+
 
 @dataclass(frozen=True)
 class EpisodeRow:
-    """What is kept of one finished episode of one trial; arrays have one element per policy parameter."""
+    """What is kept of one finished episode of one trial; arrays have one element per policy parameter.
+
+    `insight` is what the learner expected then (`ivl.learners.base.Learner.insight`).
+    """
 
     trial: int
     episode: int
@@ -68,6 +81,7 @@ class EpisodeRow:
     rate_four_leg: float
     rate_clean: float
     stopped: bool
+    insight: dict[str, Any] | None = None
 
 
 class Recorder(Protocol):

@@ -3,6 +3,8 @@
 source = open_source("udp://127.0.0.1:19850", experiment)
 """
 
+from dataclasses import replace
+
 from ivl.errors import ConfigError, LinkError
 from ivl.experiment import Experiment
 from ivl.links import pil
@@ -14,7 +16,11 @@ VEHICLE_SCHEMES = ("udp", "radio", "usb", "tcp", "serial")
 
 
 def open_source(
-    uri: str, experiment: Experiment, threads: int | None = None, options: Options | None = None
+    uri: str,
+    experiment: Experiment,
+    threads: int | None = None,
+    options: Options | None = None,
+    record: bool = False,
 ) -> RolloutSource:
     """The source that a URI names.
 
@@ -23,6 +29,7 @@ def open_source(
         experiment: What is flown.
         threads: Worker threads; for pil://.
         options: How a vehicle is flown.
+        record: Give what each flip recorded, too (`ivl.belief.recording`).
 
     Raises:
         ConfigError: No such scheme, or the rest of the URI makes no sense for it.
@@ -31,7 +38,7 @@ def open_source(
     """
     scheme, separator, _ = uri.partition("://")
     if separator and scheme == "pil":
-        return pil.PilSource(uri, experiment, threads)
+        return pil.PilSource(uri, experiment, threads, record)
     if not separator or scheme not in VEHICLE_SCHEMES:
         allowed = ", ".join(f"{name}://" for name in ("pil", *VEHICLE_SCHEMES))
         raise ConfigError(f"uri: value {uri!r} is unknown (allowed {allowed})")
@@ -39,4 +46,7 @@ def open_source(
         from ivl.links import crazyflie  # cflib takes most of a second to load
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
-    return crazyflie.CrazyflieSource(uri, experiment, options)
+    options = options or Options()
+    return crazyflie.CrazyflieSource(
+        uri, experiment, replace(options, keep_recordings=record or options.keep_recordings)
+    )

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ivl import native
+from ivl import forms, native
+from ivl.belief import recording
 from ivl.errors import LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight
@@ -125,7 +126,7 @@ class CrazyflieSource:
                 self._keep(landing)
                 good = bool(valid(outcome).all())
                 reason = "" if good else f"simulation: {self.world.end_reason(int(outcome['end_reason'][0]))}"
-                return Flown(index, outcome, reason)
+                return Flown(index, outcome, reason, self._features(landing))
             except PolicyRefused as error:
                 self._note(rollout, f"refused: {error}")
                 if self._site is not None:
@@ -142,6 +143,22 @@ class CrazyflieSource:
         raise RolloutError(
             f"{self.uri}: a rollout was discarded {ATTEMPTS_MAX} times in a row; the last reason is above"
         )
+
+    def _features(self, landing: Landing) -> np.ndarray[Any, np.dtype[np.float64]] | None:
+        """What a landing recorded of its flip, shape (1, `ivl.belief.recording.N`); None without a recorder's rows."""
+        if landing.recording is None or self._site is None:
+            return None
+        threshold_per_s = landing.rollout.theta[0] if self._experiment.policy.form == forms.PAPER else 0.0
+        features = recording.of_recorder(
+            self.world,
+            landing.recording.rows,
+            landing.recording.trigger_row,
+            landing.outcome,
+            threshold_per_s,
+            landing.battery_V if self._site.battery_is_flown else np.nan,
+            self._site.contact_is_seen,
+        )
+        return features[None]
 
     def _keep(self, landing: Landing) -> None:
         self._note(landing.rollout, "flown", landing)

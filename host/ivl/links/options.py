@@ -28,7 +28,8 @@ class Options:
         rehearse: Fly a software vehicle as if it were a drone: take-off, operator, no simulator's truth.
         other_world: Fly a software vehicle even though it simulates another world than the experiment's.
         start_hint: Command that starts a software vehicle in the experiment's world.
-        keep_recordings: Download the flight recorder of a software vehicle too (of a drone always).
+        keep_recordings: Download the flight recorder of a software vehicle too (of a drone always), and tell learners
+            what it says.
         say: Called with each line for people.
         deadlines: Limits of the link.
     """

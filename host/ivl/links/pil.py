@@ -108,8 +108,10 @@ class Chips:
 class PilSource:
     """The simulator with the flight core on emulated chips; a whole plan in one batch."""
 
-    def __init__(self, uri: str, experiment: Experiment, threads: int | None = None) -> None:
+    def __init__(self, uri: str, experiment: Experiment, threads: int | None = None, record: bool = False) -> None:
         """Fly the experiment's approach; `uri` is pil:// or pil:///path/of/image.elf.
+
+        `record`: give what each flip recorded, too, of a second flight of the same rollout.
 
         Raises:
             ConfigError: The image is missing.
@@ -118,7 +120,7 @@ class PilSource:
         self.world = experiment.make_world()
         self.chips = Chips(qemu_command(image_of(uri)))
         self.chips.attach(self.world)
-        self._source = WorldSource(self.world, experiment, threads)
+        self._source = WorldSource(self.world, experiment, threads, record)
         self.warnings: list[str] = []
 
     def fly(self, plan: Plan) -> Iterator[Flown]:

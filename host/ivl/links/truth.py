@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from ivl import native
+from ivl.belief.recording import pitch_deg
 from ivl.links.packets import Phase, Recording
 from ivl.links.vehicle import Snapshot
 from ivl.world import World, rotation
@@ -92,12 +93,6 @@ def note_no_go(outcome: np.ndarray[Any, np.dtype[np.void]], nearest_m: float, ab
     if not aborted:
         outcome["end_reason"] = _end_code("no_go")
     outcome["d_min_m"] = np.fmin(outcome["d_min_m"], nearest_m)
-
-
-def pitch_deg(q_WB: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Nose-up rotation about b_y, unwrapped along the rows, degrees; q_WB has shape (n, 4), x y z w."""
-    x, y, z, w = q_WB.T
-    return np.asarray(np.degrees(np.unwrap(np.arctan2(2.0 * (x * z - w * y), 1.0 - 2.0 * (y * y + z * z)))))
 
 
 def _impact_row(recording: Recording, world: World) -> int | None:

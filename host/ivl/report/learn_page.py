@@ -1,13 +1,16 @@
 """What the page of an `ivl learn` run shows: convergence, and every rollout of the first trial to replay."""
 
+import base64
 import json
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ivl import landing, native, run
+from ivl import landing, margin, native, run
+from ivl.assess import Best
 from ivl.errors import StoreError
 from ivl.experiment import Experiment
 from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
@@ -59,6 +62,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
             "limits": _limits(experiment, rollouts),
             "notable": [{"what": what, "landing": int(numbers[row])} for what, row in notable],
             "first_shown": [0, max(0, len(notable) - 2)],
+            "pictures": _pictures(experiment, [row for row in history if row.trial == 0], rollouts),
         },
     }
     return data, album
@@ -104,18 +108,39 @@ def _facts(experiment: Experiment, n_trials: int, folder: Path) -> list[list[str
         ["Rollouts", f"{experiment.budget} in episodes of {experiment.n_rollouts}"],
         ["Seed", str(experiment.seed) if n_trials == 1 else f"{experiment.seed} and on, {n_trials} trials"],
     ]
-    return facts + _verdict(folder / "result.json", n_trials)
+    return facts + _verdict(folder / "result.json", n_trials, experiment)
 
 
-def _verdict(path: Path, n_trials: int) -> list[list[str]]:
-    """Whether the trial was solved; nothing if the run has not been judged yet."""
+def _verdict(path: Path, n_trials: int, experiment: Experiment) -> list[list[str]]:
+    """Whether the trial was solved, and what room its policy has; nothing if the run has not been judged yet."""
     if not path.is_file():
         return [["Verdict", "not judged: the run was cut off"]]
-    verdicts = json.loads(path.read_text(encoding="utf-8"))["verdicts"]
+    result = json.loads(path.read_text(encoding="utf-8"))
+    verdicts = result["verdicts"]
     solved = [verdict["rollouts_to_convergence"] for verdict in verdicts if verdict["solved"]]
     if n_trials > 1:
         return [["Solved", f"{len(solved)} of {n_trials} trials"]]
-    return [["Solved", f"after {solved[0]} rollouts" if solved else "no"]]
+    facts = [["Solved", f"after {solved[0]} rollouts" if solved else "no"]]
+    if result.get("margin") is not None:
+        told = margin.lines(result["margin"], Best.of_dict(result["best"]), experiment)
+        facts += [[name.capitalize(), text] for name, text in told]
+    if result.get("model_fits") is not None:
+        facts.append(
+            ["Model", "fits" if result["model_fits"] else "no model fits: flights land less often than expected"]
+        )
+    return facts
+
+
+def _pictures(experiment: Experiment, history: list[EpisodeRow], rollouts: RolloutRows) -> list[dict[str, str]]:
+    """The picture of the belief as text that a browser shows without asking anybody, if the learner has a belief."""
+    from ivl.plots import belief  # matplotlib takes a second to load
+
+    if not belief.has_picture(history):
+        return []
+    with tempfile.TemporaryDirectory() as folder:
+        (path,) = belief.draw(experiment, history, rollouts, [Path(folder) / "belief.png"])
+        text = base64.b64encode(path.read_bytes()).decode()
+    return [{"name": "belief", "title": belief.TITLE, "source": f"data:image/png;base64,{text}"}]
 
 
 def _episodes(experiment: Experiment, history: list[EpisodeRow], trial: int) -> dict[str, Any]:

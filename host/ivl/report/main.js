@@ -70,6 +70,7 @@ function showLearn(data, replay) {
     return [what, figures(outcome.reward), ...data.terms.map(([name]) => figures(outcome.terms[name])), `${outcome.n_legs}${outcome.body_contact ? ", body" : ""}`, ...shown(spec.theta).map((value) => value.toFixed(2)), replayButtons(replay, landing, what)];
   }));
   $("#convergence-note").textContent = "Rate: share of landings on three or four legs in an episode. Click a dot to replay that rollout in view A.";
+  showPictures(learn.pictures);
   [1, 0].forEach((pane) => replay.show(pane, learn.notable[learn.first_shown[pane]].landing));
 }
 
@@ -88,19 +89,24 @@ function fillChoice(select, labels, onChoice) {
   select.addEventListener("change", () => onChoice(Number(select.value)));
 }
 
-// ---- a policy for every approach
-
-function showPolicy(data, replay) {
-  const { numbers, pictures, notable } = data.policy;
-  ["#numbers", "#pictures", "#notable"].forEach((id) => { $(id).hidden = false; });
-  $("#convergence").hidden = true;
-  table($("#numbers-table"), numbers.head, numbers.rows);
-  $("#numbers-note").textContent = numbers.note;
+function showPictures(pictures) {
+  $("#pictures").hidden = !pictures.length;
   pictures.forEach(({ title, source }) => {
     const figure = element("figure");
     figure.append(element("img", undefined, { src: source, alt: title }), element("figcaption", title));
     $("#pictures-list").append(figure);
   });
+}
+
+// ---- a policy for every approach
+
+function showPolicy(data, replay) {
+  const { numbers, pictures, notable } = data.policy;
+  ["#numbers", "#notable"].forEach((id) => { $(id).hidden = false; });
+  $("#convergence").hidden = true;
+  table($("#numbers-table"), numbers.head, numbers.rows);
+  $("#numbers-note").textContent = numbers.note;
+  showPictures(pictures);
   $("#notable-title").textContent = "Flights with this policy";
   table($("#notable-table"), ["flight", "V", "φ", "verdict", "replay"], notable.map(({ what, landing }) => {
     const { outcome, spec } = data.landings[landing];

@@ -44,8 +44,15 @@ class Visit:
 class Site(Protocol):
     """Where is flown.
 
+    Attributes:
+        contact_is_seen: Whether outcomes there tell when the first leg touched, and not when the accelerometer noticed.
+        battery_is_flown: Whether the voltage that the vehicle tells is that of the battery that drives its motors.
+
     Unless a method says otherwise, it may raise LinkError (the link is gone) and RolloutError (not now, and why).
     """
+
+    contact_is_seen: bool
+    battery_is_flown: bool
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """The vehicle has been connected, and nothing has been asked of it yet."""

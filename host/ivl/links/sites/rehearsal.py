@@ -9,7 +9,9 @@ from ivl.links.tables import Session
 
 
 class Rehearsal(Room):
-    """A room in which the software vehicle is flown as if it were a drone."""
+    """A room in which the software vehicle is flown as if it were a drone; of its voltage see `Simulator`."""
+
+    battery_is_flown = False
 
     @staticmethod
     def suits(session: Session, options: Options) -> bool:

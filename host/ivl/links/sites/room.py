@@ -35,6 +35,8 @@ _SETTLE_S, _IDLE_S, _ARM_S, _END_S = 1.0, 3.0, 3.0, 30.0
 class Room:
     """A site where nobody knows more than recorder, cameras and operator see."""
 
+    contact_is_seen, battery_is_flown = False, True
+
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """Any vehicle.
 

@@ -21,7 +21,12 @@ class OtherWorld(FlyingEnds):
 
 
 class Simulator:
-    """A site where everything is known, and where a landing has the bits that it has in this process."""
+    """A site where everything is known, and where a landing has the bits that it has in this process.
+
+    The voltage that a software vehicle tells is that of its power management, and not of the world's battery.
+    """
+
+    contact_is_seen, battery_is_flown = True, False
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """The vehicle must be a software vehicle."""
