@@ -78,6 +78,7 @@ void app_task_start(void)
         .variance = {logGetVarId("kalman", "varPX"), logGetVarId("kalman", "varPY"), logGetVarId("kalman", "varPZ")},
         .bypass = paramGetVarId("motorPowerSet", "enable"),
     };
+    app_idle_find(&ivl_app);
     app_tumble_check_set(IVL_PHASE_IDLE);
     DEBUG_PRINT("Inverted landing ready\n");
 }
