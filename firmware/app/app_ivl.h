@@ -178,6 +178,9 @@ void app_config_defaults(ivl_cfg_t *cfg);
 /// has, and no more thrust than its largest.
 app_config_result_t app_config_apply(app_t *app, const app_config_request_t *request);
 
+/// What to do about the row of a refused configuration, where that is more than another value; "" else.
+const char *app_config_remedy(uint8_t bad);
+
 /// The values in force come back into the parameters, and clients are told of each that was another one.  In the app's task.
 void app_config_take_back(app_t *app);
 
