@@ -63,7 +63,7 @@ def test_an_image_for_no_vehicle_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("word", range(1, flash.VECTORS))
 def test_every_vector_is_looked_at(tmp_path: Path, word: int) -> None:
     content = bytearray(image())
-    for wrong in (0x0800_4200, 0x0800_0001, flash.FLASH_START + len(content) + 1, 0xFFFF_FFFF):
+    for wrong in (0x0800_4100, 0x0800_0001, flash.FLASH_START + len(content) + 1, 0xFFFF_FFFF):
         struct.pack_into("<I", content, 4 * word, wrong)
         (tmp_path / "cf2.bin").write_bytes(content)
         with pytest.raises(ConfigError, match=f"vector {word} 0x{wrong:08x}"):
@@ -165,7 +165,7 @@ def test_a_zip_without_a_manifest_or_cut_off_is_refused(tmp_path: Path) -> None:
      (STACK, 0x0800_0001), (STACK, flash.FLASH_START + 4097), (STACK, 0)],
 )  # fmt: skip
 def test_image_that_does_not_begin_like_a_program_is_refused(tmp_path: Path, stack: int, entry: int) -> None:
-    path = write_image(tmp_path / "cf2.bin", stack, entry)
+    path = write_image(tmp_path / "cf2.bin", stack=stack, entry=entry)
     with pytest.raises(ConfigError, match=re.escape(str(path)) + ".*is no firmware"):
         flash.check_image(path)
 
