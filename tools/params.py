@@ -17,8 +17,8 @@ HEAD = """\
 
 Printed by `python tools/params.py` from [firmware/core/ivl_vars.h](../firmware/core/ivl_vars.h), the one table that the
 drone, the software vehicle and the host share, and from the rows that the app adds to it
-([firmware/app/app_vars.c](../firmware/app/app_vars.c)). A parameter outside its range, or no number, is refused, and with it the
-whole commit ([FIRMWARE](FIRMWARE.md)). Unit 1: dimensionless.
+([firmware/app/app_vars.c](../firmware/app/app_vars.c)). A parameter outside its range, or no number, is refused, and
+with it the whole commit ([FIRMWARE](FIRMWARE.md)). Unit 1: dimensionless.
 """
 PARAM_HEAD = "## Parameters\n\n| parameter | type | unit | from | to | default | |\n|---|---|---|---|---|---|---|"
 LOG_HEAD = "## Logs\n\n| log | type | unit | |\n|---|---|---|---|"

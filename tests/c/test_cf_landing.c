@@ -365,6 +365,42 @@ static void test_a_vehicle_that_hangs_is_crashed_and_a_reset_makes_it_fly(void)
     TEST_ASSERT_TRUE(info(4) && info(8));
 }
 
+static void rest_with_the_app_idle(int ms)
+{
+    for (int t = 0; t < ms; t += 50)
+    {
+        (void)send_command(IVL_REQUEST_IDLE, 0.0f, 0.0f, 1.0f, 2.5f, 1.5f);
+        run_ms(46);
+    }
+}
+
+static void test_a_vehicle_that_hangs_is_put_upright_by_hand_recovered_and_lands_again(void)
+{
+    ivl_sim_params_t params = fixture_params();
+    params.world_ceiling_height_m = 2.1;
+    const ivl_sim_model_t model = fixture_model(&params);
+    open_vehicle(&model);
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit_config(1).status);
+    const ivl_sim_spec_t spec = spec_of(2.5, 90.0, 5.0, 8.0, 0.5, 1, 0, IVL_SIM_START_IMPARTED);
+    TEST_ASSERT_EQUAL_INT(4, fly(&spec, 1).n_legs[0]);
+    run_ms(500);
+    TEST_ASSERT_TRUE(info(5) && info(7));
+    TEST_ASSERT_FALSE_MESSAGE(ivl_cf_recover(vehicle), "upside down");
+    write_u8("sil", "place", 1);
+    TEST_ASSERT_EQUAL_INT(1, (int)read_log("sil", "grounded"));
+    rest_with_the_app_idle(500);
+    TEST_ASSERT_TRUE_MESSAGE(info(7) && !info(5), "upright, and crashed until it is recovered");
+    TEST_ASSERT_TRUE(ivl_cf_hl_takeoff(vehicle, 1.0f, 0.0f, true, 1.5f) != 0 || !info(8));
+    TEST_ASSERT_TRUE(ivl_cf_recover(vehicle));
+    rest_with_the_app_idle(1500);
+    TEST_ASSERT_TRUE(!info(7) && info(3));
+    TEST_ASSERT_EQUAL_INT(0, ivl_cf_hl_takeoff(vehicle, 1.0f, 0.0f, true, 1.5f));
+    rest_with_the_app_idle(3000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.0, read_log("simTruth", "z"));
+    // the next one lands as the first
+    TEST_ASSERT_EQUAL_INT(4, fly(&spec, 2).n_legs[0]);
+}
+
 static void test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_time(void)
 {
     ivl_sim_model_t model;
@@ -459,6 +495,7 @@ int main(void)
     RUN_TEST(test_an_approach_as_flown_begins_where_the_vehicle_hovers_and_is_judged_too);
     RUN_TEST(test_motors_of_a_vehicle_that_idles_stand_still_in_flip_coast_and_hanging);
     RUN_TEST(test_a_vehicle_that_hangs_is_crashed_and_a_reset_makes_it_fly);
+    RUN_TEST(test_a_vehicle_that_hangs_is_put_upright_by_hand_recovered_and_lands_again);
     RUN_TEST(test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_time);
     RUN_TEST(test_the_recording_of_a_landing_begins_at_its_start);
     RUN_TEST(test_a_landing_may_be_asked_for_on_the_floor);
