@@ -113,7 +113,7 @@ typedef struct
     float          collective_norm;  ///< mean thrust of the last tick, of either owner
     atomic_bool    was_handed_back;  ///< in flight, to the stock controller; cleared by the app's task
 
-    app_idle_t     idle;
+    app_idle_t idle;
 
     // between tasks
     ivl_cfg_t staged;                                ///< what PARAM writes

@@ -40,7 +40,7 @@ struct param_s
 #define PARAM_ADD_WITH_CALLBACK(TYPE, NAME, ADDRESS, CALLBACK)                                                                             \
     {.type = TYPE, .name = #NAME, .address = (void *)(ADDRESS), .callback = CALLBACK},
 #define PARAM_ADD(TYPE, NAME, ADDRESS) {.type = TYPE, .name = #NAME, .address = (void *)(ADDRESS)},
-#define PARAM_ADD_GROUP(TYPE, NAME) {.type = TYPE, .name = #NAME},
+#define PARAM_ADD_GROUP(TYPE, NAME)    {.type = TYPE, .name = #NAME},
 
 #ifdef SDK_ON_HOST
 #define PARAM_STORAGE                                                                                                                      \

@@ -120,7 +120,6 @@ def connect(tour: Tour) -> str:
     tour.wait("connected", lambda: tour.find(QAbstractButton, "connectButton").text() == "Disconnect")
     tour.wait("the battery shows", lambda: tour.number("_aff_volts") > 3.0)
     tour.wait("the position shows", lambda: tour.text("estimateZ") != "")
-    tour.wait("the quality of the link shows", lambda: tour.find(QProgressBar, "linkQualityBar").value() > 50)
     tour.wait("all parameters have come", lambda: tour.window.cf.param.is_updated)
     tour.volts = tour.number("_aff_volts")
     return f"{tour.volts} V"
