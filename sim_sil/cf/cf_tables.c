@@ -309,7 +309,7 @@ bool ivl_cf_tables_open(ivl_cf_t *cf)
         }
         all_params[n_params++] = (ivl_cf_param_t){.group = group,
                                                   .name = p->name,
-                                                  .type = (ivl_cf_param_type_t)(p->type & ~PARAM_RONLY),
+                                                  .type = (uint8_t)(p->type & ~PARAM_RONLY),
                                                   .read_only = (p->type & PARAM_RONLY) != 0,
                                                   .address = p->address,
                                                   .changed = p->callback};

@@ -202,9 +202,9 @@ def disarm(tour: Tour) -> str:
 
 
 def shipped() -> set[str]:
-    """Names of the log configurations that the client brings."""
-    paths = (Path(cfclient.__file__).parent / "configs" / "log").rglob("*.json")
-    return {str(json.loads(path.read_text(encoding="utf-8"))["logconfig"]["logblock"]["name"]) for path in paths}
+    """What the client calls the log configurations that it brings: their paths."""
+    folder = Path(cfclient.__file__).parent / "configs" / "log"
+    return {path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.json")}
 
 
 def plot(tour: Tour) -> str:
@@ -242,14 +242,14 @@ def block_row(tour: Tour, name: str) -> Callable[[int], QModelIndex]:
 
 def start_block(tour: Tour) -> str:
     tour.show("Log Blocks")
-    at = block_row(tour, "Stabilizer")
+    at = block_row(tour, "stabilizer")
     tour.find(QTreeView, "_block_tree").clicked.emit(at(3))
     tour.wait("the block runs", lambda: at(3).internalPointer().logging_started())
-    return "Stabilizer runs"
+    return "stabilizer runs"
 
 
 def write_block(tour: Tour) -> str:
-    at = block_row(tour, "Stabilizer")
+    at = block_row(tour, "stabilizer")
     tour.find(QTreeView, "_block_tree").clicked.emit(at(4))
     tour.wait("it is written", lambda: at(4).internalPointer().writing_to_file())
     tour.live(0.3)
@@ -259,10 +259,10 @@ def write_block(tour: Tour) -> str:
 
 
 def stop_block(tour: Tour) -> str:
-    at = block_row(tour, "Stabilizer")
+    at = block_row(tour, "stabilizer")
     tour.find(QTreeView, "_block_tree").clicked.emit(at(3))
     tour.wait("the block stands", lambda: not at(3).internalPointer().logging_started())
-    return "Stabilizer stands"
+    return "stabilizer stands"
 
 
 def list_logs(tour: Tour) -> str:
@@ -400,9 +400,9 @@ def configure(tour: Tour) -> str:
     tour.wait("it was read", dialog._write_data_btn.isEnabled)
     dialog._pitch_trim.setValue(0.25)
     tour.click("_write_data_btn", dialog)
-    tour.live(0.1)
-    dialog._pitch_trim.setValue(0.0)
-    tour.wait("it was written and read back", lambda: abs(dialog._pitch_trim.value() - 0.25) < 1e-6)
+    tour.wait("it was written and read back", dialog._write_data_btn.isEnabled)
+    if abs(dialog._pitch_trim.value() - 0.25) > 1e-6:
+        raise ValueError(f"pitch trim {dialog._pitch_trim.value()}")
     channel = dialog._radio_channel.value()
     tour.click("_exit_btn", dialog)
     return f"channel {channel}, pitch trim 0.25"
