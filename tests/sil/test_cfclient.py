@@ -10,16 +10,17 @@ from pathlib import Path
 import pytest
 
 from ivl.silproc import SilProcess
+from ivl.world import World
 
 TOUR = Path(__file__).parent / "cfclient_tour.py"
 SESSION_ENDS_S = 1.2  # the server gives a session up after a second of silence
 
 
 @pytest.fixture
-def waiting(world, Raw):
+def waiting(Raw):
     """A vehicle that waits to be armed by hand, on an address of loopback that nobody else uses, where a scan looks."""
     host = f"127.78.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"
-    with SilProcess(world, port=19850, bind=host, speed=3.0) as sil:
+    with SilProcess(World("crazyflie21"), port=19850, bind=host) as sil:
         sil.set("sil.auto_arm", 0)
         with Raw(sil.uri) as raw:
             assert raw.ask("9d0100")[2:4] == b"\x01\x00"
