@@ -42,9 +42,7 @@ _ECHO_S, _CALL_S, _WALL_LOOK_S = 2.0, 0.01, 0.01
 _WALL_POLL_S = 0.005
 _LOGS_S = 3.0
 # what the vehicle refuses although it is in its range
-_REMEDY = {
-    "ivl.motor_thrust_max": " of the motors that its image was made for (choose them: `make -C firmware`)"
-}
+_REMEDY = {"ivl.motor_thrust_max": " of the motors that its image was made for (choose them: `make -C firmware`)"}
 _ABORT_S, _DOWN_S = 3.0, 60.0
 _ON_ITS_WAY = (Status.INCOMPLETE, Status.CRC)
 """What an echo says while the parts of a policy have not all come."""
