@@ -264,9 +264,15 @@ static void test_platform_refuses_a_rate_it_does_not_have_and_a_thrust_it_cannot
 {
     start();
     sdk_double_write_float("tick_hz", 400.0f);
-    TEST_ASSERT_EQUAL_STRING("tick_hz", ivl_cfg_name(commit(1).bad));
+    const uint8_t rate = commit(1).bad;
+    TEST_ASSERT_EQUAL_STRING("tick_hz", ivl_cfg_name(rate));
     sdk_double_write_float("motor_thrust_max", 0.19f);
-    TEST_ASSERT_EQUAL_STRING("motor_thrust_max", ivl_cfg_name(commit(2).bad));
+    const uint8_t thrust = commit(2).bad;
+    TEST_ASSERT_EQUAL_STRING("motor_thrust_max", ivl_cfg_name(thrust));
+    // more than another value is needed
+    TEST_ASSERT_NOT_NULL(strstr(app_config_remedy(thrust), "make -C firmware"));
+    TEST_ASSERT_EQUAL_STRING("", app_config_remedy(rate));
+    TEST_ASSERT_EQUAL_STRING("", app_config_remedy((uint8_t)APP_CONFIG_NONE));
     TEST_ASSERT_EQUAL_INT(2, sdk.n_told);
     sdk_double_write_float("tick_hz", 1000.0f);
     TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(3).status);
