@@ -169,6 +169,7 @@ def cfclient(picture: Path) -> list[bool]:
     with tempfile.TemporaryDirectory() as home, SilProcess(World(VEHICLE), port=19850, bind=host) as sil:
         sil.set("sil.auto_arm", 0)
         sil.set("sil.place", 1)
+        sil.set("supervisor.prefltTimeout", 60000)  # a busy machine clicks slowly
         settings = {"HOME": home, "XDG_CONFIG_HOME": home, "QT_QPA_PLATFORM": "offscreen", "SCAN_ADDRESS": host}
         command = [sys.executable, str(TOUR), sil.uri, str(picture)]
         subprocess.run(command, env={**os.environ, **settings}, stderr=subprocess.DEVNULL, timeout=1800.0, check=False)

@@ -22,6 +22,7 @@ def waiting(Raw):
     host = f"127.78.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"
     with SilProcess(World("crazyflie21"), port=19850, bind=host) as sil:
         sil.set("sil.auto_arm", 0)
+        sil.set("supervisor.prefltTimeout", 60000)  # a busy machine clicks slowly
         with Raw(sil.uri) as raw:
             assert raw.ask("9d0100")[2:4] == b"\x01\x00"
         time.sleep(SESSION_ENDS_S)
