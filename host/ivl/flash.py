@@ -32,7 +32,7 @@ _BUILD = re.compile(rb"Inverted landing ready, build 0x([0-9a-f]{8})\n")  # the 
 _URI = re.compile(r"radio://\d+/(?P<channel>\d{1,3})/(250K|1M|2M)(/[0-9A-Fa-f]{10})?")
 _CHANNEL_MAX = 125
 _MANIFEST, _MANIFEST_VERSION_MAX, _MANIFEST_BYTES_MAX = "manifest.json", 2, 100_000
-_LOAD = 1  # kind of an ELF segment
+_LOAD, _NO_BITS, _ALLOCATED = 1, 8, 2  # of ELF: kind of a segment, kind of a section, its flag
 
 
 @dataclass(frozen=True)
@@ -177,19 +177,22 @@ def _check_beside(path: Path, content: bytes) -> None:
 def loaded(program: bytes) -> bytes:
     """What an ELF file of 32 bits, little-endian, puts into flash, from the lowest address on, gaps as zeros.
 
+    As `objcopy -O binary` does it: by sections, since a segment may begin with the headers of the file.
+
     Raises:
         ValueError: It is no such file.
         struct.error: It is cut off.
     """
     if program[:6] != b"\x7fELF\x01\x01":
         raise ValueError("is no ELF file of 32 bits")
-    (table,) = struct.unpack_from("<I", program, 28)
-    size, n = struct.unpack_from("<HH", program, 42)
+    segments_at, sections_at = struct.unpack_from("<II", program, 28)
+    segment_size, n_segments, section_size, n_sections = struct.unpack_from("<4H", program, 42)
+    segments = [struct.unpack_from("<5I", program, segments_at + i * segment_size) for i in range(n_segments)]
     parts = []
-    for i in range(n):
-        kind, offset, _, address, n_bytes = struct.unpack_from("<5I", program, table + i * size)
-        if kind == _LOAD and n_bytes:
-            parts.append((address, program[offset : offset + n_bytes]))
+    for i in range(n_sections):
+        _, kind, flags, _, offset, n_bytes = struct.unpack_from("<6I", program, sections_at + i * section_size)
+        if flags & _ALLOCATED and kind != _NO_BITS and n_bytes:
+            parts.append((_address(segments, offset, n_bytes), program[offset : offset + n_bytes]))
     if not parts:
         raise ValueError("loads nothing")
     first = min(address for address, _ in parts)
@@ -200,3 +203,11 @@ def loaded(program: bytes) -> bytes:
     for address, part in parts:
         content[address - first : address - first + len(part)] = part
     return bytes(content)
+
+
+def _address(segments: list[tuple[int, ...]], offset: int, n_bytes: int) -> int:
+    """Where the bytes of a file that begin at an offset are loaded from, by the segment that holds them."""
+    for kind, begin, _, address, size in segments:
+        if kind == _LOAD and begin <= offset and offset + n_bytes <= begin + size:
+            return int(address) + offset - begin
+    raise ValueError(f"no segment loads the section at {offset}")

@@ -84,13 +84,17 @@ def test_bytes_too_many_or_missing_in_front_or_at_the_end_are_found(tmp_path: Pa
 
 
 def elf(content: bytes, cut: int = 1000, gap: int = 0) -> bytes:
-    """A program of 32 bits with two segments that are loaded, the second one first, and one that is not."""
-    header = struct.pack("<4sBB10xHHIIIIIHHHHHH", b"\x7fELF", 1, 1, 2, 40, 1, ENTRY, 52, 0, 0, 52, 32, 3, 0, 0, 0)
-    begins = 52 + 3 * 32
-    first = struct.pack("<8I", 1, begins, 0, flash.FLASH_START, cut - gap, cut - gap, 5, 4)
-    second = struct.pack("<8I", 1, begins + cut, 0x2000_0000, flash.FLASH_START + cut, len(content) - cut, 9, 6, 4)
-    other = struct.pack("<8I", 4, 0, 0, 0, 10, 10, 4, 4)
-    return header + second + other + first + content
+    """A program of 32 bits in two segments, the second one first.
+
+    The first one begins with the headers of the file. One section is not loaded, and one has no bytes.
+    """
+    begins, n = 52 + 2 * 32 + 4 * 40, len(content)
+    head = struct.pack("<4sBB10xHHIIIIIHHHHHH", b"\x7fELF", 1, 1, 2, 40, 1, ENTRY, 52, 116, 0, 52, 32, 2, 40, 4, 0)
+    first = struct.pack("<8I", 1, 0, 0, flash.FLASH_START - begins, begins + cut - gap, begins + cut - gap, 5, 4)
+    second = struct.pack("<8I", 1, begins + cut, 0x2000_0000, flash.FLASH_START + cut, n - cut, n, 6, 4)
+    sections = [(1, 2, begins, cut - gap), (1, 6, begins + cut, n - cut), (8, 3, 0, 99), (1, 0, 0, 50)]
+    table = b"".join(struct.pack("<10I", 0, kind, flags, 0, at, size, 0, 0, 4, 0) for kind, flags, at, size in sections)
+    return head + second + first + table + content
 
 
 def test_what_an_elf_file_loads(tmp_path: Path) -> None:
