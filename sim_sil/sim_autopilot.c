@@ -54,9 +54,11 @@ float ivl_sim_sdk_range_mm(const ivl_reading_t *range)
     return (range->valid != 0u && mm >= 0.0f && mm < RANGE_NONE_MM) ? mm : RANGE_NONE_MM;
 }
 
-float ivl_sim_motor_N(float norm, float thrust_N_max)
+float ivl_sim_motor_N(const ivl_sim_model_t *model, float norm, float max_N, float idle_N)
 {
-    return ivl_clamp(norm, 0.0f, 1.0f) * thrust_N_max;
+    const float asked_N = ivl_clamp(norm, 0.0f, 1.0f) * max_N;
+    const float made_N = (asked_N < (float)model->raw.rotor_thrust_least_N) ? 0.0f : asked_N;
+    return (made_N < idle_N) ? idle_N : made_N;
 }
 
 void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, const ivl_in_t *sensed, ivl_sim_autopilot_t *autopilot,
@@ -74,9 +76,10 @@ void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, 
     app_sense_motion(&autopilot->senses, &sensors, &state, firmware->phase, loop_s, sensed->t_us, in);
     app_sense_range(&autopilot->senses, ivl_sim_sdk_range_mm(&sensed->range), sensed->t_us, &in->range);
     model->core.step(port, lane, &model->firmware, firmware, in, out);
+    const float idle_N = app_stops_motors(out) ? 0.0f : (float)model->raw.rotor_thrust_idle_N;
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
-        out->thrust_N[i] = ivl_sim_motor_N(out->thrust_N[i] / max_N, max_N);
+        out->thrust_N[i] = ivl_sim_motor_N(model, out->thrust_N[i] / max_N, max_N, idle_N);
     }
     // the controller is called more often than the core, and carries the attitude on with the gyro that it has
     for (int i = 1; i < n_loop; i++)

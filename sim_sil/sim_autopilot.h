@@ -35,8 +35,10 @@ void ivl_sim_sdk_of(ivl_sim_told_t *told, const ivl_in_t *sensed, sensorData_t *
 /// What the SDK says of a range: whole millimetres; 0 without a sensor, 32767 if it has found nothing.
 float ivl_sim_sdk_range_mm(const ivl_reading_t *range);
 
-/// The share of the largest thrust as the motors take it, N.
-float ivl_sim_motor_N(float norm, float thrust_N_max);
+/// The share of the largest thrust as the motors take it, N.                                          [MODEL eq. 2.11]
+/// @param[in] max_N   largest thrust
+/// @param[in] idle_N  thrust of a motor of which nothing is asked
+float ivl_sim_motor_N(const ivl_sim_model_t *model, float norm, float max_N, float idle_N);
 
 /// One tick of the core in lane `lane` of a port, on what the sensors say.
 /// @param[in] sensed  with the command to the core

@@ -32,6 +32,8 @@
     X(rotor, drag_share, norm, "1", 0.0, 0.95, 0.0, "share of the slowing down that grows with the square of the speed; 0: a pure exponential") \
     X(rotor, thrust_gain, norm, "1", 0.5, 1.5, 1.0, "delivered thrust / commanded thrust at the rated voltage, below saturation") \
     X(rotor, inflow_loss, spm, "s/m", 0.0, 0.3, 0.0, "relative loss of thrust for each m/s of climb along the rotors' axis") \
+    X(rotor, thrust_least, N, "N", 0.0, 1.0, 0.0, "least thrust that can be asked of a motor; what is below it asks for nothing") \
+    X(rotor, thrust_idle, N, "N", 0.0, 1.0, 0.0, "thrust of an armed motor of which nothing is asked, where the autopilot does not stop it") \
     X(rotor, thrust_scatter, norm, "1", 0.0, 0.5, 0.0, "standard deviation of each motor's relative thrust error, drawn once a rollout") \
     X(battery, voltage, V, "V", 0.0, 30.0, 0.0, "open-circuit voltage during a rollout; 0: a supply that never sags") \
     X(battery, voltage_scatter, V, "V", 0.0, 5.0, 0.0, "its standard deviation, drawn once a rollout") \

@@ -4,6 +4,7 @@
     python tools/clients.py rig crazyflie-lib-python             (sys_test/swarm_test_rig, ten vehicles)
     python tools/clients.py grounded crazyflie-lib-python        (sys_test/single_cf_grounded)
     python tools/clients.py qa crazyflie-testing                 (tests/QA; wants toml and pytest-timeout)
+    python tools/clients.py cfclient                             (the client as installed; wants make qt-libraries)
 
 The folders are checkouts of bitcraze/crazyflie-lib-python and bitcraze/crazyflie-testing. Programs run from copies in a
 temporary folder, in which the addresses of radios are those of the vehicles, and nothing else is changed. One line per
@@ -13,6 +14,7 @@ exit code of 0 alone is no success. WORD selects the programs whose path has it.
 
 import argparse
 import contextlib
+import json
 import os
 import re
 import shutil
@@ -29,6 +31,7 @@ from ivl.silproc import SilProcess
 from ivl.world import World
 
 VEHICLE = "crazyflie21"
+TOUR = Path(__file__).parent.parent / "tests" / "sil" / "cfclient_tour.py"
 RADIO = re.compile(r"""(?P<quote>['"])(?:radio|usb)://[^'"]*(?P=quote)""")
 WATCHED = ("simTruth.x", "simTruth.y", "simTruth.z", "stateEstimate.yaw")
 PERIOD_S = 0.1
@@ -160,6 +163,21 @@ def unit_tests(folder: Path, chosen: list[str], decks: list[str], n: int, patter
     return results
 
 
+def cfclient(picture: Path) -> list[bool]:
+    """Everything in Bitcraze's client that this vehicle has, clicked once; the window in flight goes into a picture."""
+    host = f"127.78.{os.getpid() >> 8 & 255}.{os.getpid() & 255}"  # where nobody else scans
+    with tempfile.TemporaryDirectory() as home, SilProcess(World(VEHICLE), port=19850, bind=host) as sil:
+        sil.set("sil.auto_arm", 0)
+        sil.set("sil.place", 1)
+        sil.set("supervisor.prefltTimeout", 60000)  # a busy machine clicks slowly
+        settings = {"HOME": home, "XDG_CONFIG_HOME": home, "QT_QPA_PLATFORM": "offscreen", "SCAN_ADDRESS": host}
+        command = [sys.executable, str(TOUR), sil.uri, str(picture)]
+        subprocess.run(command, env={**os.environ, **settings}, stderr=subprocess.DEVNULL, timeout=1800.0, check=False)
+    seen = json.loads(picture.with_suffix(".json").read_text(encoding="utf-8"))
+    print(f"{len(seen['plotted'])} log configurations drew", flush=True)
+    return [thing["ok"] for thing in seen["things"]]
+
+
 def qa(folder: Path, chosen: list[str], decks: list[str]) -> list[bool]:
     """Bitcraze's own tests of a vehicle, at a site that has the software vehicle and its decks."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
@@ -191,15 +209,18 @@ def qa(folder: Path, chosen: list[str], decks: list[str]) -> list[bool]:
 def main() -> int:
     """Run what was asked for, and count."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("examples", "rig", "grounded", "qa"))
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("what", choices=("examples", "rig", "grounded", "qa", "cfclient"))
+    parser.add_argument("folder", type=Path, nargs="?", default=Path(), help="the checkout; not for cfclient")
     parser.add_argument("word", nargs="*", help="run only what has one of these words in its path")
     parser.add_argument("--deck", action="append", default=[], help="as for ivl sil")
     parser.add_argument("--seconds", type=float, default=120.0, help="after which an example is stopped")
     said = parser.parse_args()
     if not said.folder.is_dir():
         parser.error(f"{said.folder}: is no folder")
-    if said.what == "examples":
+    if said.what == "cfclient":
+        with tempfile.TemporaryDirectory() as pictures:
+            results = cfclient(Path(pictures) / "cfclient.png")
+    elif said.what == "examples":
         results = examples(said.folder, said.word, said.deck, said.seconds)
     elif said.what == "rig":
         results = unit_tests(said.folder, said.word, said.deck, 10, "sys_test/swarm_test_rig/test_*.py")
@@ -207,7 +228,7 @@ def main() -> int:
         results = unit_tests(said.folder, said.word, said.deck, 1, "sys_test/single_cf_grounded/test_*.py")
     else:
         results = qa(said.folder, said.word, said.deck or ["none"])
-    print(f"{sum(results)} of {len(results)} with exit code 0")
+    print(f"{sum(results)} of {len(results)} {'things' if said.what == 'cfclient' else 'with exit code 0'}")
     return 0
 
 

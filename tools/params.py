@@ -4,6 +4,7 @@ The C compiler expands the tables (tools/vars.c), so that the page cannot read t
 """
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -15,11 +16,13 @@ HEAD = """\
 # Parameters and logs of the flight core
 
 Printed by `python tools/params.py` from [firmware/core/ivl_vars.h](../firmware/core/ivl_vars.h), the one table that the
-drone, the software vehicle and the host share. A parameter outside its range, or no number, is refused, and with it the
-whole commit ([FIRMWARE](FIRMWARE.md)). Unit 1: dimensionless.
+drone, the software vehicle and the host share, and from the rows that the app adds to it
+([firmware/app/app_vars.c](../firmware/app/app_vars.c)). A parameter outside its range, or no number, is refused, and
+with it the whole commit ([FIRMWARE](FIRMWARE.md)). Unit 1: dimensionless.
 """
 PARAM_HEAD = "## Parameters\n\n| parameter | type | unit | from | to | default | |\n|---|---|---|---|---|---|---|"
 LOG_HEAD = "## Logs\n\n| log | type | unit | |\n|---|---|---|---|"
+APP_HEAD = "## What the app adds\n\n| name | | type | |\n|---|---|---|---|"
 TYPES = {"float": "float", "uint8_t": "u8", "uint16_t": "u16", "uint32_t": "u32", "int8_t": "i8"}
 
 
@@ -33,6 +36,20 @@ def rows() -> list[list[str]]:
     return [line.split("\t") for line in out.splitlines()]
 
 
+def app_rows() -> list[str]:
+    """Lines of the table for what the app adds, from its macros and the comments before them."""
+    text = (ROOT / "firmware" / "app" / "app_vars.c").read_text(encoding="utf-8")
+    row = r"/\*\*\s+\* @brief (.*?)\s*\*/\s+(PARAM|LOG)_ADD\w*\(\w+_(U?INT)(\d+)( \| PARAM_RONLY)?, (\w+),"
+    found = re.findall(row, text, re.DOTALL)
+    if len(found) != len(re.findall(r"^(?:PARAM|LOG)_ADD", text, re.MULTILINE)):
+        raise ValueError("firmware/app/app_vars.c: a row has no comment, or is none that this tool reads")
+    return [
+        f"| `ivl.{name}` | {kind.lower()}{', read-only' if read_only else ''} | "
+        f"{number.replace('UINT', 'u').replace('INT', 'i')}{bits} | {' '.join(doc.replace('*', ' ').split())} |"
+        for doc, kind, number, bits, read_only, name in found
+    ]
+
+
 def page() -> str:
     """The whole text."""
     params = [PARAM_HEAD]
@@ -42,7 +59,7 @@ def page() -> str:
             params.append(f"| `{name}` | {TYPES[ctype]} | {unit} | {low} | {high} | {default} | {text} |")
         else:
             logs.append(f"| `{name}` | {TYPES[ctype]} | {unit} | {text} |")
-    return "\n".join([HEAD, *params, "", *logs, ""])
+    return "\n".join([HEAD, *params, "", *logs, "", APP_HEAD, *app_rows(), ""])
 
 
 def main() -> int:

@@ -89,6 +89,7 @@ void controllerOutOfTree(control_t *control, const setpoint_t *setpoint, const s
     {
         look_around(app, setpoint, now_us);
         app_step(app);
+        app_idle_step(app);
     }
     if (app->out.stock_allowed)
     {

@@ -8,6 +8,7 @@
 ///   stock thrust: 0..65535 for the same share
 #ifndef APP_CONVERT_H
 #define APP_CONVERT_H
+#include "ivl.h"
 #include "ivl_math.h"
 #include "ivl_types.h"
 #include "platform_defaults.h"
@@ -62,6 +63,12 @@ static inline float app_norm_of_stock(float thrust)
 static inline float app_stock_of_norm(float norm)
 {
     return ivl_clamp(norm, 0.0f, 1.0f) * APP_STOCK_THRUST_MAX;
+}
+
+/// True where the core wants motors that stand still: all of them, or the rear pair in the flip.
+static inline bool app_stops_motors(const ivl_out_t *out)
+{
+    return !out->stock_allowed && (!out->motors_on || (out->phase == IVL_PHASE_FLIP));
 }
 
 /// A reading of the ranging sensor that arrives now.

@@ -15,6 +15,7 @@
 #include "ivl_parts.h"
 #include "ivl_record.h"
 #include "ivl_wire.h"
+#include "param.h"
 
 #define APP_CONFIG_NONE 255u  ///< no row of IVL_PARAMS
 
@@ -75,6 +76,15 @@ typedef struct
     uint32_t    since_ms;
 } app_pending_t;
 
+/// The SDK's parameter powerDist.idleThrust.
+typedef struct
+{
+    paramVarId_t id;        ///< written by the app's task, before is_known
+    atomic_bool  is_known;  ///< there is such a parameter; written by the app's task
+    bool         is_off;    ///< it is 0, since the core stops motors
+    unsigned int found;     ///< what it was before
+} app_idle_t;
+
 /// Written by the stabilizer's task alone, unless a line says otherwise; others may read single numbers for logs.
 typedef struct
 {
@@ -102,6 +112,8 @@ typedef struct
     ivl_handover_t handover;
     float          collective_norm;  ///< mean thrust of the last tick, of either owner
     atomic_bool    was_handed_back;  ///< in flight, to the stock controller; cleared by the app's task
+
+    app_idle_t idle;
 
     // between tasks
     ivl_cfg_t staged;                                ///< what PARAM writes
@@ -166,6 +178,9 @@ void app_config_defaults(ivl_cfg_t *cfg);
 /// has, and no more thrust than its largest.
 app_config_result_t app_config_apply(app_t *app, const app_config_request_t *request);
 
+/// What to do about the row of a refused configuration, where that is more than another value; "" else.
+const char *app_config_remedy(uint8_t bad);
+
 /// The values in force come back into the parameters, and clients are told of each that was another one.  In the app's task.
 void app_config_take_back(app_t *app);
 
@@ -174,6 +189,12 @@ void app_memory_register(void);
 
 /// The tumble check of the SDK's supervisor: off in flip and coast only.
 void app_tumble_check_set(ivl_phase_t phase);
+
+/// Find the SDK's idle thrust (app_idle.c).  In the app's task, once at the start.
+void app_idle_find(app_t *app);
+
+/// No idle thrust where the core stops motors.  In the stabilizer's task, after app_step.
+void app_idle_step(app_t *app);
 
 /// One packet of the host, in the app's task: hand it to the stabilizer's task.  Not while app_packets_waiting.
 void app_packets_handle(app_t *app, const uint8_t *bytes, size_t size);

@@ -2,6 +2,7 @@
 /// The app's task: talks to the host, and does what the stabilizer's task must not wait for.
 #include "FreeRTOS.h"
 #include "app.h"
+#include "app_build.h"
 #include "app_channel.h"
 #include "app_convert.h"
 #include "app_ivl.h"
@@ -78,8 +79,10 @@ void app_task_start(void)
         .variance = {logGetVarId("kalman", "varPX"), logGetVarId("kalman", "varPY"), logGetVarId("kalman", "varPZ")},
         .bypass = paramGetVarId("motorPowerSet", "enable"),
     };
+    app_idle_find(&ivl_app);
     app_tumble_check_set(IVL_PHASE_IDLE);
-    DEBUG_PRINT("Inverted landing ready\n");
+    // by this text an image is known (ivl flash)
+    DEBUG_PRINT("Inverted landing ready, build " APP_TEXT(IVL_BUILD) "\n");
 }
 
 void app_task_once(void)

@@ -184,7 +184,8 @@ static void tell_config(app_t *app, app_config_result_t result)
     if (result.status != IVL_WIRE_OK)
     {
         const char *name = ivl_cfg_name(result.bad);
-        DEBUG_PRINT("Configuration %lu refused (%d): %s\n", (unsigned long)result.seq, result.status, (name != NULL) ? name : "not now");
+        DEBUG_PRINT("Configuration %lu refused (%d): %s%s\n", (unsigned long)result.seq, result.status, (name != NULL) ? name : "not now",
+                    app_config_remedy(result.bad));
         app_config_take_back(app);
     }
     const ivl_wire_config_echo_t echo = {result.seq, result.status, result.bad, app->config_crc};

@@ -2,6 +2,7 @@
 /// Parameters and logs of the core, from the tables of ivl_vars.h.  Writes go to a staged copy, which ivl.commit puts in force as a whole.
 #include <string.h>
 
+#include "app_build.h"
 #include "app_convert.h"
 #include "app_ivl.h"
 #include "log.h"
@@ -49,6 +50,11 @@ app_config_result_t app_config_apply(app_t *app, const app_config_request_t *req
     return (app_config_result_t){request->seq, (int8_t)status, (bad < 0) ? (uint8_t)APP_CONFIG_NONE : (uint8_t)bad};
 }
 
+const char *app_config_remedy(uint8_t bad)
+{
+    return (bad == (uint8_t)ROW_motor_thrust_N_max) ? ": more than the motors that this image was configured for (make -C firmware)" : "";
+}
+
 /// Each row has a setter of its type by its own name; comparing bytes also finds what is no number.
 static void take_back_float(const char *name, const float *staged, float in_force)
 {
@@ -87,6 +93,8 @@ static void commit_written(void)
 
 // ---- tables of the SDK: its own macros make a name from a token, these rows have it as a string already
 
+static const uint32_t BUILD = IVL_BUILD;
+
 #define PARAM_TYPE_OF_float   PARAM_FLOAT
 #define PARAM_TYPE_OF_uint8_t PARAM_UINT8
 #define PARAM_ROW(ctype, group, row_name, field, unit, min, max, dflt, doc)                                                                \
@@ -99,6 +107,10 @@ IVL_PARAMS(PARAM_ROW)
  * of the app channel.  Refused in flight, and when a value is out of range or no number; then the values in force come back.
  */
 PARAM_ADD_WITH_CALLBACK(PARAM_UINT32, commit, &ivl_app.commit, commit_written)
+/**
+ * @brief Number of the app's build, a checksum of its sources; 0 in a simulated vehicle
+ */
+PARAM_ADD(PARAM_UINT32 | PARAM_RONLY, build, &BUILD)
 PARAM_GROUP_STOP(ivl)
 
 #define LOG_TYPE_OF_float       LOG_FLOAT

@@ -32,13 +32,15 @@ struct param_s
 #define PARAM_UINT8  0x08
 #define PARAM_UINT32 0x0A
 #define PARAM_FLOAT  0x06
+#define PARAM_RONLY  0x40
 #define PARAM_GROUP  0x80
 #define PARAM_START  1
 #define PARAM_STOP   0
 
 #define PARAM_ADD_WITH_CALLBACK(TYPE, NAME, ADDRESS, CALLBACK)                                                                             \
     {.type = TYPE, .name = #NAME, .address = (void *)(ADDRESS), .callback = CALLBACK},
-#define PARAM_ADD_GROUP(TYPE, NAME) {.type = TYPE, .name = #NAME},
+#define PARAM_ADD(TYPE, NAME, ADDRESS) {.type = TYPE, .name = #NAME, .address = (void *)(ADDRESS)},
+#define PARAM_ADD_GROUP(TYPE, NAME)    {.type = TYPE, .name = #NAME},
 
 #ifdef SDK_ON_HOST
 #define PARAM_STORAGE                                                                                                                      \

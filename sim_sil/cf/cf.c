@@ -48,6 +48,7 @@ static void boot_settings(ivl_cf_t *cf)
         .cppm = {.roll_degps = 720.0f, .pitch_degps = 720.0f, .yaw_degps = 400.0f, .roll_deg = 50.0f, .pitch_deg = 50.0f},
         .ext_pos_sigma_m = 0.01f,
         .low_V = 3.2f,
+        .idle_pwm = (cf->model.raw.rotor_thrust_idle_N > 0.0) ? (uint32_t)IVL_CF_IDLE_PWM : 0u,
         .sim = before.sim,
         .has_flow_deck = before.has_flow_deck,
         .has_ranger_deck = before.has_ranger_deck,
@@ -160,7 +161,7 @@ static void supervise(ivl_cf_t *cf)
     const ivl_cf_supervisor_in_t in = {
         .now_ms = ivl_cf_now_ms(cf),
         .acc_g = {cf->acc_g[0], cf->acc_g[1], cf->acc_g[2]},
-        .motors_run = cf->motor_N[0] > 0.0f || cf->motor_N[1] > 0.0f || cf->motor_N[2] > 0.0f || cf->motor_N[3] > 0.0f,
+        .motors_run = ivl_cf_motors_run(cf),
         .setpoint_age_ms = ivl_cf_commander_age_ms(&cf->commander, ivl_cf_now_ms(cf)),
     };
     if (ivl_cf_supervisor_update(&cf->supervisor, &in))

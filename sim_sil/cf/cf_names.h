@@ -59,6 +59,7 @@
     LIVE(F32, cppm, rateYaw,   P, THE.set.cppm.yaw_degps, NULL) \
     LIVE(F32, cppm, angPitch,  P, THE.set.cppm.pitch_deg, NULL) \
     LIVE(F32, cppm, angRoll,   P, THE.set.cppm.roll_deg, NULL) \
+    LIVE(U32, powerDist, idleThrust, CP, THE.set.idle_pwm, NULL) \
     LIVE(U8,  motorPowerSet, enable, C, THE.set.bypass, NULL) \
     LIVE(U16, motorPowerSet, m1,     C, THE.set.bypass_pwm[0], NULL) \
     LIVE(U16, motorPowerSet, m2,     C, THE.set.bypass_pwm[1], NULL) \
@@ -190,7 +191,6 @@
     HELD(F32, ctrlMel, kd_omega_rp,  CP, 200.0f) \
     HELD(F32, ctrlMel, i_range_m_xy, P, 1.0f) \
     HELD(F32, ctrlMel, i_range_m_z,  P, 1500.0f) \
-    HELD(U32, powerDist, idleThrust, CP, 0) \
     HELD(U8,  colAv, enable,     C, 0) \
     HELD(F32, colAv, ellipsoidX, C, 0.3f) \
     HELD(F32, colAv, ellipsoidY, C, 0.3f) \

@@ -173,15 +173,6 @@ paramVarId_t paramGetVarId(const char *group, const char *name)
     return (paramVarId_t){.id = NOT_FOUND};
 }
 
-/// Of parameters of one byte: the app asks for no others.
-unsigned int paramGetUint(paramVarId_t varid)
-{
-    size_t                n;
-    const ivl_cf_param_t *params = ivl_cf_params(&ivl_cf_the, &n);
-    const bool            known = varid.id < n && params[varid.id].type == IVL_CF_PARAM_U8;
-    return known ? *(const uint8_t *)params[varid.id].address : 0u;
-}
-
 static void *address_of(paramVarId_t varid, ivl_cf_param_type_t type)
 {
     size_t                n;
@@ -189,13 +180,26 @@ static void *address_of(paramVarId_t varid, ivl_cf_param_type_t type)
     return (varid.id < n && params[varid.id].type == type) ? params[varid.id].address : NULL;
 }
 
-/// The server sees by itself what has changed.  Of parameters of one byte, as above.
+/// Of the two types that the app asks for.
+unsigned int paramGetUint(paramVarId_t varid)
+{
+    const uint8_t *const  byte = address_of(varid, IVL_CF_PARAM_U8);
+    const uint32_t *const word = address_of(varid, IVL_CF_PARAM_U32);
+    return (byte != NULL) ? *byte : ((word != NULL) ? *word : 0u);
+}
+
+/// The server sees by itself what has changed.  Of the same types.
 void paramSetInt(paramVarId_t varid, int valuei)
 {
-    uint8_t *const at = address_of(varid, IVL_CF_PARAM_U8);
-    if (at != NULL)
+    uint8_t *const  byte = address_of(varid, IVL_CF_PARAM_U8);
+    uint32_t *const word = address_of(varid, IVL_CF_PARAM_U32);
+    if (byte != NULL)
     {
-        *at = (uint8_t)valuei;
+        *byte = (uint8_t)valuei;
+    }
+    if (word != NULL)
+    {
+        *word = (uint32_t)valuei;
     }
 }
 

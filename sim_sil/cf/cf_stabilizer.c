@@ -42,27 +42,44 @@ static ivl_status_t commit(void *port, int lane, const ivl_cfg_t *cfg, ivl_state
 
 // ---- out
 
-static void give(float thrust_N[4], float norm_1, float norm_2, float norm_3, float norm_4)
+/// Thrust grows with the square of the duty cycle, nearly.
+static float idle_N(const ivl_cf_t *cf)
+{
+    const float share = (float)cf->set.idle_pwm / (float)IVL_CF_IDLE_PWM;
+    return (float)cf->model.raw.rotor_thrust_idle_N * share * share;
+}
+
+bool ivl_cf_motors_run(const ivl_cf_t *cf)
+{
+    bool run = false;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        run = run || cf->motor_N[i] > idle_N(cf);
+    }
+    return run;
+}
+
+static void give(const ivl_cf_t *cf, float thrust_N[4], float norm_1, float norm_2, float norm_3, float norm_4)
 {
     const float norm[4] = {norm_1, norm_2, norm_3, norm_4};
     for (int i = 0; i < 4; i++)
     {
-        thrust_N[i] = ivl_sim_motor_N(norm[i], THRUST_MAX);
+        thrust_N[i] = ivl_sim_motor_N(&cf->model, norm[i], THRUST_MAX, idle_N(cf));
     }
 }
 
 /// The SDK's mixer for X.  Motors 1 and 4 are in front, 1 and 2 on the right.
-static void distribute(const control_t *control, float thrust_N[4])
+static void distribute(const ivl_cf_t *cf, const control_t *control, float thrust_N[4])
 {
     if (control->controlMode == controlModeForce)
     {
         const float *norm = control->normalizedForces;
-        give(thrust_N, norm[0], norm[1], norm[2], norm[3]);
+        give(cf, thrust_N, norm[0], norm[1], norm[2], norm[3]);
         return;
     }
     const float t = app_norm_of_stock(control->thrust), y = (float)control->yaw / PWM_MAX;
     const float r = 0.5f * (float)control->roll / PWM_MAX, p = 0.5f * (float)control->pitch / PWM_MAX;
-    give(thrust_N, t - r + p + y, t - r - p - y, t + r - p + y, t + r + p - y);
+    give(cf, thrust_N, t - r + p + y, t - r - p - y, t + r - p + y, t + r + p - y);
 }
 
 static void bypass(const ivl_cf_t *cf, float thrust_N[4])
@@ -100,7 +117,7 @@ void ivl_cf_stabilize(ivl_cf_t *cf)
     {
         controllerPid(&cf->control, &setpoint, &cf->sensors, &cf->state, step);
     }
-    distribute(&cf->control, cf->motor_N);
+    distribute(cf, &cf->control, cf->motor_N);
     if (!ivl_cf_supervisor_motors_allowed(&cf->supervisor))
     {
         memset(cf->motor_N, 0, sizeof cf->motor_N);

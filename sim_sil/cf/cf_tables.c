@@ -307,8 +307,12 @@ bool ivl_cf_tables_open(ivl_cf_t *cf)
         {
             return false;
         }
-        all_params[n_params++] =
-            (ivl_cf_param_t){.group = group, .name = p->name, .type = p->type, .address = p->address, .changed = p->callback};
+        all_params[n_params++] = (ivl_cf_param_t){.group = group,
+                                                  .name = p->name,
+                                                  .type = (uint8_t)(p->type & ~PARAM_RONLY),
+                                                  .read_only = (p->type & PARAM_RONLY) != 0,
+                                                  .address = p->address,
+                                                  .changed = p->callback};
     }
     const struct log_s *l = sdk_logs_ivl;
     for (const char *group = l++->name; l->type != (LOG_GROUP | LOG_STOP); l++)

@@ -21,6 +21,7 @@ enum
     IVL_CF_CONTROLLER_APP = 6,
     IVL_CF_ESTIMATOR_KALMAN = 2,
     IVL_CF_START_AS_FLOWN = 255,
+    IVL_CF_IDLE_PWM = 7000,  ///< powerDist.idleThrust of a vehicle with brushless motors
     IVL_CF_PLANNER_MS = 10,
     IVL_CF_SUPERVISOR_MS = 40,
     IVL_CF_EEPROM_BYTES = 8192,
@@ -53,6 +54,7 @@ typedef struct
     uint8_t             controller, estimator;
     uint8_t             bypass;  ///< motorPowerSet.enable
     uint16_t            bypass_pwm[4];
+    uint32_t            idle_pwm;  ///< of armed motors; IVL_CF_IDLE_PWM makes the vehicle's rotor.thrust_idle
     uint8_t             alt_hold, pos_hold, pos_set, stab_roll, stab_pitch, stab_yaw, yaw_mode;
     uint8_t             group_mask;  ///< of the high-level commander
     float               takeoff_mps, landing_mps;
@@ -193,6 +195,9 @@ extern const ivl_sim_core_t ivl_cf_core;
 
 /// One call of the controller, between two ticks of the world.
 void ivl_cf_stabilize(ivl_cf_t *cf);
+
+/// A motor is asked for more than its idle thrust: what the supervisor takes for flying.
+bool ivl_cf_motors_run(const ivl_cf_t *cf);
 
 // ---- cf_world.c
 

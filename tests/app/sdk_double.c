@@ -20,6 +20,8 @@
 
 enum
 {
+    BYPASS_ID = 3,
+    IDLE_ID = 4,
     FIRST_ID = 100  // of the group ivl
 };
 
@@ -256,9 +258,14 @@ paramVarId_t paramGetVarId(const char *group, const char *name)
     {
         return (paramVarId_t){.id = (uint16_t)(FIRST_ID + (find_param(name) - sdk_params_ivl))};
     }
+    if (strcmp(group, "powerDist") == 0)
+    {
+        TEST_ASSERT_EQUAL_STRING("idleThrust", name);
+        return (paramVarId_t){.id = sdk.has_no_idle ? 0xffffu : IDLE_ID};
+    }
     TEST_ASSERT_EQUAL_STRING("motorPowerSet", group);
     TEST_ASSERT_EQUAL_STRING("enable", name);
-    return (paramVarId_t){.id = 3u};
+    return (paramVarId_t){.id = BYPASS_ID};
 }
 
 static void tell(paramVarId_t varid, uint8_t type, const void *bytes, size_t size)
@@ -276,13 +283,23 @@ void paramSetFloat(paramVarId_t varid, float valuef)
 
 void paramSetInt(paramVarId_t varid, int valuei)
 {
+    if (varid.id == IDLE_ID)
+    {
+        sdk.idle_thrust = (unsigned int)valuei;
+        sdk.n_idle_told++;
+        return;
+    }
     const uint8_t value = (uint8_t)valuei;
     tell(varid, PARAM_UINT8, &value, sizeof value);
 }
 
 unsigned int paramGetUint(paramVarId_t varid)
 {
-    TEST_ASSERT_EQUAL_UINT16(3u, varid.id);
+    if (varid.id == IDLE_ID)
+    {
+        return sdk.idle_thrust;
+    }
+    TEST_ASSERT_EQUAL_UINT16(BYPASS_ID, varid.id);
     return sdk.motor_power_set;
 }
 

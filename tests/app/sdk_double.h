@@ -35,6 +35,8 @@ typedef struct
     bool         has_variance;
     float        range_up_mm;  ///< 0: no such sensor
     unsigned int motor_power_set;
+    unsigned int idle_thrust;  ///< powerDist.idleThrust
+    bool         has_no_idle;  ///< there is no such parameter
     setpoint_t   setpoint;
     sensorData_t sensors;
     state_t      state;
@@ -49,6 +51,7 @@ typedef struct
     int                            n_pid_init, n_pid_null, n_pid;
     stabilizerStep_t               last_pid_step;
     int                            n_relax, n_go_to;
+    int                            n_idle_told;
     int                            n_told;  ///< parameters that were changed by the app, and told to clients
     float                          go_to[5];
     char                           printed[80];  ///< format of the last line

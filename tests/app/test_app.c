@@ -264,9 +264,15 @@ static void test_platform_refuses_a_rate_it_does_not_have_and_a_thrust_it_cannot
 {
     start();
     sdk_double_write_float("tick_hz", 400.0f);
-    TEST_ASSERT_EQUAL_STRING("tick_hz", ivl_cfg_name(commit(1).bad));
+    const uint8_t rate = commit(1).bad;
+    TEST_ASSERT_EQUAL_STRING("tick_hz", ivl_cfg_name(rate));
     sdk_double_write_float("motor_thrust_max", 0.19f);
-    TEST_ASSERT_EQUAL_STRING("motor_thrust_max", ivl_cfg_name(commit(2).bad));
+    const uint8_t thrust = commit(2).bad;
+    TEST_ASSERT_EQUAL_STRING("motor_thrust_max", ivl_cfg_name(thrust));
+    // more than another value is needed
+    TEST_ASSERT_NOT_NULL(strstr(app_config_remedy(thrust), "make -C firmware"));
+    TEST_ASSERT_EQUAL_STRING("", app_config_remedy(rate));
+    TEST_ASSERT_EQUAL_STRING("", app_config_remedy((uint8_t)APP_CONFIG_NONE));
     TEST_ASSERT_EQUAL_INT(2, sdk.n_told);
     sdk_double_write_float("tick_hz", 1000.0f);
     TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(3).status);
@@ -467,6 +473,74 @@ static void test_tumble_check_is_off_in_flip_and_coast_only_and_on_after_a_resta
     tumbleCheckEnabled = 0;
     run_task(1);
     TEST_ASSERT_EQUAL_UINT8(1, tumbleCheckEnabled);
+}
+
+/// A vehicle that flips, coasts and hangs: the idle thrust in each of these phases.
+static void assert_idle_through_a_landing(unsigned int found, unsigned int on_ground)
+{
+    start();
+    sdk.idle_thrust = found;
+    app_task_start();
+    sdk.pid_thrust = 1.05f * HOVER_THRUST;
+    sdk.setpoint.mode.z = modeAbs;
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(1).status);
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, send_policy(11, 4.0f, 0.008f).status);
+    (void)send_command(IVL_REQUEST_HOVER);
+    assert_phase(IVL_PHASE_READY);
+    TEST_ASSERT_EQUAL_UINT(found, sdk.idle_thrust);
+    flip();
+    TEST_ASSERT_EQUAL_UINT(on_ground, sdk.idle_thrust);
+    sdk.sensors.acc = (Axis3f){0.0f, 0.0f, 0.0f};
+    sdk_double_run(1010);
+    assert_phase(IVL_PHASE_COAST);
+    TEST_ASSERT_EQUAL_UINT(on_ground, sdk.idle_thrust);
+    sdk.sensors.acc.z = -1.0f;
+    sdk_double_run(210);
+    assert_phase(IVL_PHASE_ATTACHED);
+    TEST_ASSERT_EQUAL_UINT(on_ground, sdk.idle_thrust);
+}
+
+static void give_back_to_stock(void)
+{
+    sdk.sensors.acc.z = 1.0f;
+    sdk.setpoint = (setpoint_t){.mode.z = modeDisable};
+    heartbeat(IVL_REQUEST_IDLE, 3000);
+    TEST_ASSERT_TRUE(ivl_app.out.stock_allowed);
+}
+
+static void test_idle_thrust_is_off_where_the_core_stops_motors_and_comes_back(void)
+{
+    const unsigned int found[] = {1, 7000, 15000, 65535};
+    for (size_t i = 0; i < sizeof found / sizeof found[0]; i++)
+    {
+        assert_idle_through_a_landing(found[i], 0);
+        TEST_ASSERT_EQUAL_INT(1, sdk.n_idle_told);
+        give_back_to_stock();
+        TEST_ASSERT_EQUAL_UINT(found[i], sdk.idle_thrust);
+        TEST_ASSERT_EQUAL_INT(2, sdk.n_idle_told);
+    }
+    // brushed motors have none: nothing is written, nobody is told
+    assert_idle_through_a_landing(0, 0);
+    give_back_to_stock();
+    TEST_ASSERT_EQUAL_INT(0, sdk.n_idle_told);
+}
+
+static void test_idle_thrust_that_the_host_writes_meanwhile_stays(void)
+{
+    assert_idle_through_a_landing(7000, 0);
+    sdk.idle_thrust = 5000;
+    give_back_to_stock();
+    TEST_ASSERT_EQUAL_UINT(5000, sdk.idle_thrust);
+}
+
+static void test_a_platform_without_an_idle_thrust_is_left_alone(void)
+{
+    start();
+    sdk.has_no_idle = true;
+    app_task_start();
+    start_ready();
+    flip();
+    TEST_ASSERT_EQUAL_INT(0, sdk.n_idle_told);
 }
 
 static void spoil_vbat(void)
@@ -703,6 +777,23 @@ static void test_message_of_a_deck_that_is_no_reading_is_counted_and_commands_no
     assert_phase(IVL_PHASE_IDLE);
     TEST_ASSERT_EQUAL_UINT32(11, ivl_app.state.policy.id.seq);
     TEST_ASSERT_EQUAL_INT(0, sdk.n_sent);
+}
+
+static void test_message_of_anybody_but_the_camera_is_refused_and_counted(void)
+{
+    const CPXTarget_t        strangers[] = {0, CPX_T_STM32, CPX_T_ESP32, CPX_T_WIFI_HOST, 5, 6, 7};
+    const ivl_wire_reading_t packet = {3u, 0.0f, 2.0f, 0.5f};
+    const uint32_t           n = (uint32_t)(sizeof strangers / sizeof strangers[0]);
+    start_in_flight();
+    for (uint32_t i = 0; i < n; i++)
+    {
+        CPXPacket_t message = {.route = {.source = strangers[i], .destination = CPX_T_STM32, .function = CPX_F_APP}};
+        message.dataLength = (uint16_t)ivl_wire_put_reading(message.data, &packet);
+        sdk.cpx_handler(&message);
+        sdk_double_run(20);
+    }
+    assert_counts(0, n);
+    TEST_ASSERT_EQUAL_UINT64(0, ivl_app.in.rrev.t_us);
 }
 
 static void test_motors_driven_past_the_controller_refuse_to_arm(void)
@@ -980,6 +1071,9 @@ int main(void)
     RUN_TEST(test_motors_stay_off_after_the_landing_whatever_the_stock_controller_wants);
     RUN_TEST(test_controller_that_is_switched_away_in_the_air_comes_back_with_its_motors_off);
     RUN_TEST(test_tumble_check_is_off_in_flip_and_coast_only_and_on_after_a_restart);
+    RUN_TEST(test_idle_thrust_is_off_where_the_core_stops_motors_and_comes_back);
+    RUN_TEST(test_idle_thrust_that_the_host_writes_meanwhile_stays);
+    RUN_TEST(test_a_platform_without_an_idle_thrust_is_left_alone);
     RUN_TEST(test_each_fault_that_the_sdk_reports_aborts_before_the_trigger_and_not_after);
     RUN_TEST(test_host_that_falls_silent_aborts_and_the_set_point_is_given_up);
     RUN_TEST(test_estimator_that_stands_still_aborts);
@@ -990,6 +1084,7 @@ int main(void)
     RUN_TEST(test_reading_that_is_no_number_out_of_range_or_too_old_is_refused_and_counted);
     RUN_TEST(test_reading_that_comes_too_soon_or_was_sampled_before_the_last_one_changes_nothing);
     RUN_TEST(test_message_of_a_deck_that_is_no_reading_is_counted_and_commands_nothing);
+    RUN_TEST(test_message_of_anybody_but_the_camera_is_refused_and_counted);
     RUN_TEST(test_motors_driven_past_the_controller_refuse_to_arm);
     RUN_TEST(test_nothing_arms_before_a_configuration_is_in_force);
     RUN_TEST(test_policy_is_echoed_as_it_is_in_force);

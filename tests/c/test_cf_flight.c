@@ -847,6 +847,46 @@ static void test_memories_that_every_crazyflie_has(void)
     TEST_ASSERT_EQUAL_HEX8(ivl_wire_crc(0, bytes + 8, (size_t)bytes[9] + 2u) & 0xffu, bytes[10 + bytes[9]]);
 }
 
+static void open_brushless(void)
+{
+    ivl_cf_close(vehicle);
+    ivl_sim_params_t params = fixture_params();
+    params.world_ceiling_height_m = 2.5;
+    params.rotor_thrust_idle_N = 0.006;
+    model = fixture_model(&params);
+    open_vehicle(&model);
+}
+
+static void test_armed_motors_idle_as_a_parameter_says_and_that_is_no_flight(void)
+{
+    open_brushless();
+    const double full_N = (double)model.firmware.motor_thrust_N_max;
+    const struct
+    {
+        uint32_t pwm;
+        double   share;
+    } rows[] = {{7000, 1.0}, {3500, 0.25}, {0, 0.0}, {14000, 4.0}};
+    run_ms(400);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+    {
+        TEST_ASSERT_TRUE(i > 0 || *(const uint32_t *)find_param("powerDist", "idleThrust")->address == rows[0].pwm);
+        write_u32("powerDist", "idleThrust", rows[i].pwm);
+        run_ms(1000);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0, 65535.0 * rows[i].share * 0.006 / full_N, read_log("motor", "m3"));
+        TEST_ASSERT_TRUE(info(1) && !info(4));
+    }
+    write_u32("powerDist", "idleThrust", 7000);
+    take_off();
+    TEST_ASSERT_TRUE(info(4));
+    TEST_ASSERT_EQUAL_INT(0, ivl_cf_hl_land(vehicle, 0.0f, 0.0f, true, 2.0f));
+    run_ms(4500);
+    TEST_ASSERT_FALSE(info(4));
+    ivl_cf_arm(vehicle, false);
+    write_u8("sil", "auto_arm", 0);
+    run_ms(200);
+    TEST_ASSERT_DOUBLE_WITHIN(0.0, 0.0, read_log("motor", "m3"));
+}
+
 static void test_without_power_it_falls_and_after_it_boots_where_it_lies(void)
 {
     take_off();
@@ -1077,6 +1117,7 @@ int main(void)
     RUN_TEST(test_a_multi_ranger_sees_walls_and_ceiling_late_and_nothing_where_nothing_is);
     RUN_TEST(test_a_flow_deck_sees_the_floor_pass_below);
     RUN_TEST(test_memories_that_every_crazyflie_has);
+    RUN_TEST(test_armed_motors_idle_as_a_parameter_says_and_that_is_no_flight);
     RUN_TEST(test_without_power_it_falls_and_after_it_boots_where_it_lies);
     RUN_TEST(test_a_hand_puts_the_vehicle_on_its_feet_below_where_it_is);
     RUN_TEST(test_the_app_flies_hover_and_hands_back);

@@ -226,6 +226,16 @@ static void test_so_they_have_with_a_camera_a_ranging_sensor_and_lost_samples(vo
     }
 }
 
+static void test_so_they_have_with_motors_that_idle_and_have_a_least_thrust(void)
+{
+    draws_t          draws = {81};
+    ivl_sim_params_t params = noisy_params(2);
+    params.rotor_thrust_idle_N = 0.006;
+    params.rotor_thrust_least_N = 0.02;
+    const ivl_sim_model_t model = fixture_model(&params);
+    compare_landings(&model, &draws, 12);
+}
+
 static void test_so_they_have_without_any_noise(void)
 {
     draws_t                draws = {80};
@@ -312,6 +322,26 @@ static void test_an_approach_as_flown_begins_where_the_vehicle_hovers_and_is_jud
 
 // ---- what is left behind
 
+static void test_motors_of_a_vehicle_that_idles_stand_still_in_flip_coast_and_hanging(void)
+{
+    ivl_sim_params_t params = fixture_params();
+    params.world_ceiling_height_m = 2.1;
+    params.rotor_thrust_idle_N = 0.006;
+    const ivl_sim_model_t model = fixture_model(&params);
+    open_vehicle(&model);
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit_config(1).status);
+    const ivl_sim_spec_t    spec = spec_of(2.5, 90.0, 5.0, 8.0, 0.5, 1, 0, IVL_SIM_START_IMPARTED);
+    const ivl_sim_outcome_t o = fly(&spec, 1);
+    TEST_ASSERT_EQUAL_INT(4, o.n_legs[0]);
+    // the supervisor has not yet seen that it hangs, and would let motors idle
+    TEST_ASSERT_EQUAL_INT(0, (int)read_log("motor", "m1"));
+    TEST_ASSERT_EQUAL_INT(0, (int)read_log("motor", "m2"));
+    TEST_ASSERT_EQUAL_UINT32(0, *(const uint32_t *)find_param("powerDist", "idleThrust")->address);
+    write_u8("sil", "reset", 1);
+    run_ms(100);
+    TEST_ASSERT_EQUAL_UINT32(7000, *(const uint32_t *)find_param("powerDist", "idleThrust")->address);
+}
+
 static void test_a_vehicle_that_hangs_is_crashed_and_a_reset_makes_it_fly(void)
 {
     ivl_sim_params_t params = fixture_params();
@@ -333,6 +363,42 @@ static void test_a_vehicle_that_hangs_is_crashed_and_a_reset_makes_it_fly(void)
     run_ms(3000);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.05, read_log("simTruth", "z"));
     TEST_ASSERT_TRUE(info(4) && info(8));
+}
+
+static void rest_with_the_app_idle(int ms)
+{
+    for (int t = 0; t < ms; t += 50)
+    {
+        (void)send_command(IVL_REQUEST_IDLE, 0.0f, 0.0f, 1.0f, 2.5f, 1.5f);
+        run_ms(46);
+    }
+}
+
+static void test_a_vehicle_that_hangs_is_put_upright_by_hand_recovered_and_lands_again(void)
+{
+    ivl_sim_params_t params = fixture_params();
+    params.world_ceiling_height_m = 2.1;
+    const ivl_sim_model_t model = fixture_model(&params);
+    open_vehicle(&model);
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit_config(1).status);
+    const ivl_sim_spec_t spec = spec_of(2.5, 90.0, 5.0, 8.0, 0.5, 1, 0, IVL_SIM_START_IMPARTED);
+    TEST_ASSERT_EQUAL_INT(4, fly(&spec, 1).n_legs[0]);
+    run_ms(500);
+    TEST_ASSERT_TRUE(info(5) && info(7));
+    TEST_ASSERT_FALSE_MESSAGE(ivl_cf_recover(vehicle), "upside down");
+    write_u8("sil", "place", 1);
+    TEST_ASSERT_EQUAL_INT(1, (int)read_log("sil", "grounded"));
+    rest_with_the_app_idle(500);
+    TEST_ASSERT_TRUE_MESSAGE(info(7) && !info(5), "upright, and crashed until it is recovered");
+    TEST_ASSERT_TRUE(ivl_cf_hl_takeoff(vehicle, 1.0f, 0.0f, true, 1.5f) != 0 || !info(8));
+    TEST_ASSERT_TRUE(ivl_cf_recover(vehicle));
+    rest_with_the_app_idle(1500);
+    TEST_ASSERT_TRUE(!info(7) && info(3));
+    TEST_ASSERT_EQUAL_INT(0, ivl_cf_hl_takeoff(vehicle, 1.0f, 0.0f, true, 1.5f));
+    rest_with_the_app_idle(3000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.0, read_log("simTruth", "z"));
+    // the next one lands as the first
+    TEST_ASSERT_EQUAL_INT(4, fly(&spec, 2).n_legs[0]);
 }
 
 static void test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_time(void)
@@ -422,11 +488,14 @@ int main(void)
     RUN_TEST(test_landings_have_the_bits_of_the_same_landing_in_the_process_of_the_host);
     RUN_TEST(test_so_they_have_at_every_rate_of_the_stabilizer);
     RUN_TEST(test_so_they_have_with_a_camera_a_ranging_sensor_and_lost_samples);
+    RUN_TEST(test_so_they_have_with_motors_that_idle_and_have_a_least_thrust);
     RUN_TEST(test_so_they_have_without_any_noise);
     RUN_TEST(test_speed_and_angle_come_from_the_command_unless_a_parameter_tells_them_more_precisely);
     RUN_TEST(test_a_landing_that_was_cut_short_by_a_reset_leaves_no_trace_in_the_next_one);
     RUN_TEST(test_an_approach_as_flown_begins_where_the_vehicle_hovers_and_is_judged_too);
+    RUN_TEST(test_motors_of_a_vehicle_that_idles_stand_still_in_flip_coast_and_hanging);
     RUN_TEST(test_a_vehicle_that_hangs_is_crashed_and_a_reset_makes_it_fly);
+    RUN_TEST(test_a_vehicle_that_hangs_is_put_upright_by_hand_recovered_and_lands_again);
     RUN_TEST(test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_time);
     RUN_TEST(test_the_recording_of_a_landing_begins_at_its_start);
     RUN_TEST(test_a_landing_may_be_asked_for_on_the_floor);

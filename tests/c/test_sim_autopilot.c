@@ -66,9 +66,27 @@ static void test_a_range_is_whole_millimetres(void)
 
 static void test_motors_take_a_share_between_none_and_all(void)
 {
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, 0.09f, ivl_sim_motor_N(0.5f, 0.18f));
-    TEST_ASSERT_FLOAT_WITHIN(0.0f, 0.18f, ivl_sim_motor_N(1.5f, 0.18f));
-    TEST_ASSERT_FLOAT_WITHIN(0.0f, 0.0f, ivl_sim_motor_N(-0.1f, 0.18f));
+    const ivl_sim_params_t params = fixture_params();
+    const ivl_sim_model_t  model = fixture_model(&params);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, 0.09f, ivl_sim_motor_N(&model, 0.5f, 0.18f, 0.0f));
+    TEST_ASSERT_FLOAT_WITHIN(0.0f, 0.18f, ivl_sim_motor_N(&model, 1.5f, 0.18f, 0.0f));
+    TEST_ASSERT_FLOAT_WITHIN(0.0f, 0.0f, ivl_sim_motor_N(&model, -0.1f, 0.18f, 0.0f));
+    TEST_ASSERT_FLOAT_WITHIN(0.0f, 1.0e-6f, ivl_sim_motor_N(&model, 1.0e-6f, 1.0f, 0.0f));
+}
+
+static void test_what_is_below_the_least_thrust_is_none_or_idle(void)
+{
+    ivl_sim_params_t params = fixture_params();
+    params.rotor_thrust_least_N = 0.02;
+    const ivl_sim_model_t model = fixture_model(&params);
+    const float           asked_N[] = {-0.1f, 0.0f, 1.0e-6f, 0.0199f, 0.0201f, 0.1f, 0.3f};
+    const float           made_N[] = {0.0f, 0.0f, 0.0f, 0.0f, 0.0201f, 0.1f, 0.2f};
+    for (size_t i = 0; i < sizeof asked_N / sizeof asked_N[0]; i++)
+    {
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, made_N[i], ivl_sim_motor_N(&model, asked_N[i] / 0.2f, 0.2f, 0.0f));
+        const float idle_N = (made_N[i] < 0.004f) ? 0.004f : made_N[i];
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, idle_N, ivl_sim_motor_N(&model, asked_N[i] / 0.2f, 0.2f, 0.004f));
+    }
 }
 
 // ---- a position that stands still
@@ -130,10 +148,13 @@ static ivl_sim_autopilot_t autopilot;
 static ivl_state_t         firmware;
 static ivl_out_t           out;
 
+static double idle_N;  // of the model in these tests
+
 static void tick(const ivl_in_t *in, double tick_hz)
 {
-    const ivl_sim_params_t params = fixture_params();
-    ivl_sim_model_t        model = fixture_model(&params);
+    ivl_sim_params_t params = fixture_params();
+    params.rotor_thrust_idle_N = idle_N;
+    ivl_sim_model_t model = fixture_model(&params);
     model.core = (ivl_sim_core_t){.open = open_port, .close = close_port, .step = look};
     model.tick_s = 1.0 / tick_hz;
     ivl_sim_autopilot_step(&model, NULL, 0, in, &autopilot, &firmware, &out);
@@ -200,6 +221,25 @@ static void test_motor_thrusts_are_those_of_the_motors(void)
     TEST_ASSERT_FLOAT_WITHIN(0.0f, most_N, out.thrust_N[3]);
 }
 
+static void test_motors_idle_unless_the_core_stops_them(void)
+{
+    const ivl_in_t in = sensed_at(1000000u);
+    idle_N = 0.004;
+    for (int phase = 0; phase < IVL_PHASE_COUNT; phase++)
+    {
+        for (int bits = 0; bits < 4; bits++)
+        {
+            out = (ivl_out_t){.phase = (ivl_phase_t)phase, .motors_on = (bits & 1) != 0, .stock_allowed = (bits & 2) != 0};
+            const bool idles = out.stock_allowed || (out.motors_on && phase != IVL_PHASE_FLIP);
+            tick(&in, 500.0);
+            TEST_ASSERT_FLOAT_WITHIN(0.0f, idles ? 0.004f : 0.0f, out.thrust_N[0]);
+            TEST_ASSERT_FLOAT_WITHIN(0.0f, idles ? 0.004f : 0.0f, out.thrust_N[1]);
+            TEST_ASSERT_FLOAT_WITHIN(1.0e-8f, 0.05f, out.thrust_N[2]);
+        }
+    }
+    idle_N = 0.0;
+}
+
 /// Pitch of what the core saw, nose down.
 static float pitch_rad(void)
 {
@@ -253,10 +293,12 @@ int main(void)
     RUN_TEST(test_units_cost_one_bit_at_most);
     RUN_TEST(test_a_range_is_whole_millimetres);
     RUN_TEST(test_motors_take_a_share_between_none_and_all);
+    RUN_TEST(test_what_is_below_the_least_thrust_is_none_or_idle);
     RUN_TEST(test_only_a_new_sample_of_a_position_that_stands_still_is_told_as_another_one);
     RUN_TEST(test_the_core_sees_the_command_and_a_position_dated_by_its_last_change);
     RUN_TEST(test_a_range_is_a_new_reading_when_its_millimetres_change);
     RUN_TEST(test_motor_thrusts_are_those_of_the_motors);
+    RUN_TEST(test_motors_idle_unless_the_core_stops_them);
     RUN_TEST(test_in_a_flip_the_attitude_is_the_gyro_s_at_every_rate_of_the_core);
     return UNITY_END();
 }

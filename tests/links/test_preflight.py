@@ -7,12 +7,14 @@ import pytest
 
 from ivl import experiment, native
 from ivl.cli import run
+from ivl.errors import RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight
 from ivl.links.tables import Session
 from ivl.links.vehicle import Vehicle
 from ivl.native import Field, NativeLibrary
 from ivl.silproc import SilProcess
+from ivl.world import World
 
 
 @pytest.fixture
@@ -128,3 +130,9 @@ def test_missing_link_is_one_line_and_an_exit_code(
     assert captured.out == ""
     assert message in captured.err
     assert len(captured.err.splitlines()) == 1
+
+
+def test_motors_that_the_image_is_too_weak_for_are_refused_with_what_to_do(server: SilProcess) -> None:
+    stronger = World("habas2021", **{"rotor.thrust_max": 0.2})
+    with Session(server.uri) as session, pytest.raises(RolloutError, match=r"motor_thrust_max.*make -C firmware"):
+        Vehicle(session).configure(stronger)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from ivl import silproc
+from ivl import bootloader, silproc
 from ivl.experiment import load
 from ivl.silproc import SilProcess
 from ivl.world import World
@@ -95,3 +95,9 @@ def test_experiments_vehicle_is_flown(tmp_path):
     ivl = [sys.executable, "-c", "from ivl.cli import main; main()", "sil"]
     subprocess.run([*ivl, "--experiment", "experiments/paper_vertical.yaml", "--write-model", str(file)], check=True)
     assert file.read_text(encoding="ascii") == silproc.model_text(load("experiments/paper_vertical.yaml").make_world())
+
+
+def test_a_vehicle_says_what_it_is_and_which_build_it_runs(sil):
+    now = bootloader.running(sil.uri)
+    assert now == bootloader.Running(bootloader.device_name(sil.uri), 0), "no image, so no number"
+    assert now.device.startswith("Crazyflie")

@@ -41,6 +41,8 @@ _PORT_SUPERVISOR, _PORT_HL, _PORT_PLATFORM, _APP = 9, 8, 13, 2
 _ECHO_S, _CALL_S, _WALL_LOOK_S = 2.0, 0.01, 0.01
 _WALL_POLL_S = 0.005
 _LOGS_S = 3.0
+# what the vehicle refuses although it is in its range
+_REMEDY = {"ivl.motor_thrust_max": " of the motors that its image was made for (choose them: `make -C firmware`)"}
 _ABORT_S, _DOWN_S = 3.0, 60.0
 _ON_ITS_WAY = (Status.INCOMPLETE, Status.CRC)
 """What an echo says while the parts of a policy have not all come."""
@@ -347,7 +349,8 @@ class Vehicle:
         if status != Status.OK:
             name = list(fields)[bad] if bad < len(fields) else ""
             what = f"{name}: value {wanted[name]:g}: " if name else ""
-            raise RolloutError(f"configuration: {what}the vehicle refused it: {STATUS_TEXT[Status(status)]}")
+            why = STATUS_TEXT[Status(status)] + _REMEDY.get(name, "")
+            raise RolloutError(f"configuration: {what}the vehicle refused it: {why}")
         if found != crc:
             raise RolloutError(f"configuration: the vehicle has CRC {found:08x} in force, not {crc:08x}")
         return crc
