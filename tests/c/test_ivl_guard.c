@@ -10,11 +10,6 @@ static bool              is_tested[IVL_RULE_COUNT];
 
 typedef void (*spoiler_t)(ivl_in_t *in);
 
-static ivl_vitals_t good_vitals(void)
-{
-    return (ivl_vitals_t){.given = true, .configured = true, .can_fly = true, .stock_idle = true, .vbat_V = 4.0f};
-}
-
 static bool is_before_trigger(ivl_phase_t phase)
 {
     return (phase == IVL_PHASE_IDLE) || (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_LEVEL_OUT);
