@@ -85,6 +85,7 @@ typedef struct
     bool          runs;          ///< the app's controller is the one that is called
     ivl_phase_t   phase;         ///< after the last millisecond
     int           ready_ms;      ///< in READY without a break
+    int           away_ms;       ///< the link has been down
     bool          landed;        ///< a flip was begun: motors are off but in it
     float         rest_ms;       ///< upright, at rest, nobody wants to fly
     uint32_t      n_trigger, policy_crc, policy_seq, cfg_crc;
@@ -153,7 +154,8 @@ static void check_flip(void)
     must(1.0e-3f * (float)model.ready_ms + SLACK_S >= fmaxf(ivl_app.cfg.ready_s_min, 0.1f), "a flip without its time in READY");
     must(sdk.state.velocity.z + 1.0e-3f >= (d_m - 0.02f) * state->policy.theta[0], "a flip outside the policy's region");
     must((s->policy.crc == model.policy_crc) && (s->policy.seq == state->policy.id.seq), "a flip of another policy");
-    must(sdk.can_fly && sdk.is_connected && (sdk.vbat_V > 3.0f), "a flip of a vehicle that may not fly");
+    must(sdk.can_fly && (sdk.vbat_V > 3.0f), "a flip of a vehicle that may not fly");
+    must(1.0e-3f * (float)model.away_ms <= ivl_app.cfg.link_s_max + SLACK_S, "a flip of a vehicle whose link is down");
 }
 
 static void check_motors(ivl_phase_t phase)
@@ -253,6 +255,7 @@ static void check(void)
     }
     check_stop(phase);
     model.runs = sdk.controller_runs;
+    model.away_ms = sdk.is_connected ? 0 : model.away_ms + 1;
 }
 
 // before each step of the stabilizer
