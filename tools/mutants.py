@@ -18,6 +18,15 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+import cmaes  # noqa: F401 - loaded once for all children
+import hypothesis  # noqa: F401
+import matplotlib.pyplot  # noqa: F401
+import numpy as np  # noqa: F401
+import pydantic  # noqa: F401
+import pytest
+import scipy.stats  # noqa: F401
+import sklearn.svm  # noqa: F401
+import yaml  # noqa: F401
 from mutant_rules import Mutant, is_other_program, mutants
 
 ROOT = Path(__file__).parents[1]
@@ -25,11 +34,15 @@ PAGE = ROOT / "docs" / "RELIABILITY.md"
 EQUAL = ROOT / "tools" / "mutants_equal.txt"
 BEGIN, END = "<!-- measured by tools/mutants.py: begin -->\n", "<!-- measured by tools/mutants.py: end -->\n"
 TREE = ROOT / "build" / "mutants"
+MARK = TREE / "fault"
+"""Names the source that has a fault in the copy, while it has."""
 FLAVOUR = "O0"
 """Compiled and linked soonest."""
 TIME_S = 180.0
 """A test that takes longer has noticed: its program no longer ends."""
 FOUND, SURVIVED, EQUIVALENT, NONE = "found", "survived", "equivalent", "none"
+QUIET = ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+"""What is loaded before is not rewritten, and need not be."""
 NATIVE = ["make", "--no-print-directory", "-f", "tools/native.mk", f"FLAVOUR={FLAVOUR}", "WARNINGS=-w"]
 APP = ["make", "--no-print-directory", "-f", "tools/app.mk", "CC=gcc -w"]
 
@@ -119,12 +132,11 @@ def read_equal() -> dict[tuple[str, str, str], str]:
 # ---- running
 
 
-def run(command: list[str], folder: Path, environment: dict[str, str] | None = None) -> int:
+def run(command: list[str], folder: Path) -> int:
     """Exit code of a command; -1 if it does not end, and then it and its children are ended."""
     with subprocess.Popen(
         command,
         cwd=folder,
-        env=environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -137,6 +149,37 @@ def run(command: list[str], folder: Path, environment: dict[str, str] | None = N
             return -1
 
 
+def run_pytest(test: str) -> int:
+    """Exit code of pytest on a file of the copy, -1 if it does not end.
+
+    A child of this process has what takes long to load already, but nothing of the package that has the fault.
+    """
+    child = os.fork()
+    if child == 0:
+        code = 99
+        try:
+            os.setsid()
+            quiet = os.open(os.devnull, os.O_RDWR)
+            for fd in (0, 1, 2):
+                os.dup2(quiet, fd)
+            os.chdir(TREE)
+            os.environ["PYTHONPATH"] = str(TREE / "host")
+            os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(TREE / "found")
+            sys.path.insert(0, str(TREE / "host"))
+            code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "--tb=no", *QUIET, test]))
+        finally:
+            os._exit(code)
+    ends_s = time.monotonic() + TIME_S
+    while time.monotonic() < ends_s:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.02)
+    os.killpg(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return -1
+
+
 def copy_tree() -> None:
     """The tree as it is; what was compiled in the copy before is kept, and makefiles compile what is newer."""
     for name in ("firmware", "sim_sil", "tests", "tools", "host", "build/unity"):
@@ -145,10 +188,13 @@ def copy_tree() -> None:
     for name in ("pyproject.toml", "Makefile", "docs", "CHANGELOG.md", "README.md"):
         if not (TREE / name).is_symlink():
             (TREE / name).symlink_to(ROOT / name)
-    for folder in ("firmware/core", "firmware/app", "sim_sil/crtp"):
-        for source in (TREE / folder).glob("*.c"):
-            # a fault of an interrupted run may be in its object
-            os.utime(source)
+    for name in (FLAVOUR, "app"):
+        if (ROOT / "build" / name).is_dir() and not (TREE / "build" / name).exists():
+            shutil.copytree(ROOT / "build" / name, TREE / "build" / name, symlinks=True)
+    if MARK.exists():
+        # the fault of a run that was ended is in its object still
+        os.utime(TREE / MARK.read_text(encoding="utf-8"))
+        MARK.unlink()
 
 
 def programs(area: Area, path: str) -> list[str]:
@@ -201,10 +247,8 @@ def try_python(area: Area, mutant: Mutant, source: str) -> Verdict:
         return Verdict(mutant, NONE)
     stem = Path(mutant.path).stem
     tests = sorted(area.tests, key=lambda name: (stem.split("_")[0] not in name, area.tests.index(name)))
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:randomly"]
-    environment = {**os.environ, "PYTHONPATH": str(TREE / "host"), "HYPOTHESIS_STORAGE_DIRECTORY": str(TREE / "found")}
     for test in tests:
-        if run([*command, test], TREE, environment) != 0:
+        if run_pytest(test) != 0:
             return Verdict(mutant, FOUND, Path(test).stem)
     return Verdict(mutant, SURVIVED)
 
@@ -213,6 +257,7 @@ def try_one(area: Area, mutant: Mutant) -> Verdict:
     """Put a fault into the copy, ask, and take it out again."""
     path, original = TREE / mutant.path, ROOT / mutant.path
     source = original.read_text(encoding="utf-8")
+    MARK.write_text(mutant.path, encoding="utf-8")
     path.write_text(mutant.text, encoding="utf-8")
     try:
         return try_python(area, mutant, source) if path.suffix == ".py" else try_c(area, mutant)
@@ -220,6 +265,7 @@ def try_one(area: Area, mutant: Mutant) -> Verdict:
         shutil.copy2(original, path)
         # a source that is newer than its object is compiled again
         os.utime(path)
+        MARK.unlink()
 
 
 def try_area(area: Area, number: int, seed: int, equal: dict[tuple[str, str, str], str]) -> list[Verdict]:
@@ -247,9 +293,7 @@ def check_untouched(areas: list[Area]) -> None:
             commands = [build_of(program) for program in programs(area, first)]
             bad = [command[-1] for command in commands if run(command, TREE) != 0]
         else:
-            command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
-            environment = {**os.environ, "PYTHONPATH": str(TREE / "host")}
-            bad = [test for test in area.tests if run([*command, test], TREE, environment) != 0]
+            bad = [test for test in area.tests if run_pytest(test) != 0]
         if bad:
             raise SystemExit(f"mutants: without a fault these fail already: {', '.join(bad)}")
 

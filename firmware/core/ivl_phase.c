@@ -60,19 +60,16 @@ CONDITION(may_arm)
     return wanted && state->derived.cfg_good && fresh(state) && rule_says(state, IVL_ACT_NONE);
 }
 
-// On a vehicle, whatever it is configured to: one packet never leads from the floor, or another controller, to a flip in a moment.
-static const float VEHICLE_READY_S_MIN = 0.1f;
-
-static float ready_s(const ivl_cfg_t *cfg, const ivl_state_t *state)
+// A vehicle, whatever it is configured to, is in READY for a tick at least: no tick leads from IDLE to a flip.
+static bool was_ready(const ivl_cfg_t *cfg, const ivl_state_t *state)
 {
-    const bool is_short = state->guard.vitals.given && (cfg->ready_s_min < VEHICLE_READY_S_MIN);
-    return is_short ? VEHICLE_READY_S_MIN : cfg->ready_s_min;
+    return elapsed(state, cfg->ready_s_min) && (!state->guard.vitals.given || (state->n_phase_tick > 0u));
 }
 
 CONDITION(may_approach)
 {
     UNUSED(seen);
-    return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && fresh(state) && elapsed(state, ready_s(cfg, state));
+    return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && fresh(state) && was_ready(cfg, state);
 }
 
 // ---- conditions: the landing

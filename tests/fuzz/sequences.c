@@ -151,7 +151,8 @@ static void check_flip(void)
     must(state->has_policy, "a flip without a policy");
     must(model.wanted == IVL_REQUEST_APPROACH, "a flip that nobody has asked for");
     must(state->policy.n == 2u, "a flip of a policy that expects no landing");
-    must(1.0e-3f * (float)model.ready_ms + SLACK_S >= fmaxf(ivl_app.cfg.ready_s_min, 0.1f), "a flip without its time in READY");
+    must(model.ready_ms > 0, "a flip of a vehicle that was never READY");
+    must(1.0e-3f * (float)model.ready_ms + SLACK_S >= fmaxf(ivl_app.cfg.ready_s_min, 0.001f), "a flip without its time in READY");
     must(sdk.state.velocity.z + 1.0e-3f >= (d_m - 0.02f) * state->policy.theta[0], "a flip outside the policy's region");
     must((s->policy.crc == model.policy_crc) && (s->policy.seq == state->policy.id.seq), "a flip of another policy");
     must(sdk.can_fly && (sdk.vbat_V > 3.0f), "a flip of a vehicle that may not fly");
@@ -209,7 +210,8 @@ static bool rests(void)
 
 static void remember(ivl_phase_t phase)
 {
-    model.ready_ms = (phase == IVL_PHASE_READY) ? model.ready_ms + 1 : model.ready_ms;
+    model.ready_ms += (phase == IVL_PHASE_READY) ? 1 : 0;
+    model.ready_ms = (phase == IVL_PHASE_IDLE) ? 0 : model.ready_ms;
     if ((phase == IVL_PHASE_READY) && (model.phase != IVL_PHASE_READY))
     {
         model.ready_ms = 1;
