@@ -60,16 +60,10 @@ CONDITION(may_arm)
     return wanted && state->derived.cfg_good && fresh(state) && rule_says(state, IVL_ACT_NONE);
 }
 
-// A vehicle, whatever it is configured to, is in READY for a tick at least: no tick leads from IDLE to a flip.
-static bool was_ready(const ivl_cfg_t *cfg, const ivl_state_t *state)
-{
-    return elapsed(state, cfg->ready_s_min) && (!state->guard.vitals.given || (state->n_phase_tick > 0u));
-}
-
 CONDITION(may_approach)
 {
     UNUSED(seen);
-    return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && fresh(state) && was_ready(cfg, state);
+    return requested(state, IVL_REQUEST_APPROACH) && state->has_policy && fresh(state) && elapsed(state, cfg->ready_s_min);
 }
 
 // ---- conditions: the landing

@@ -95,29 +95,6 @@ static void test_approach_triggers_in_the_first_tick_when_the_threshold_is_zero(
     TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, -0.008f, fix.out.pitch_moment_Nm);
 }
 
-/// On a vehicle a single packet does not arm and flip in one tick, however it is configured; ticks of 2 ms.
-static void test_a_vehicle_is_in_ready_for_a_tick_at_least(void)
-{
-    const float stays_s[] = {0.0f, 0.002f, 0.004f, 0.2f};
-    const int   stays_ticks[] = {1, 1, 2, 100};
-    for (size_t i = 0; i < sizeof stays_s / sizeof stays_s[0]; i++)
-    {
-        fix_to_phase(&fix, IVL_PHASE_IDLE);
-        fix.cfg.ready_s_min = stays_s[i];
-        fix_policy(&fix, 0.0f, 0.008f);
-        fix.in.vitals = good_vitals();
-        fix.in.v_WB_mps.z = 2.0f;
-        fix.in.cmd.request = IVL_REQUEST_APPROACH;
-        for (int k = 0; k < stays_ticks[i]; k++)
-        {
-            fix_tick(&fix);
-            assert_phase(IVL_PHASE_READY, &fix);
-        }
-        fix_tick(&fix);
-        assert_phase(IVL_PHASE_FLIP, &fix);
-    }
-}
-
 static void test_approach_waits_in_ready_for_the_policy_and_the_minimum_stay(void)
 {
     fix_init(&fix);
@@ -393,7 +370,6 @@ int main(void)
     RUN_TEST(test_request_abort_hovers_before_the_trigger_and_does_nothing_after_it);
     RUN_TEST(test_approach_passes_through_ready_in_the_same_tick);
     RUN_TEST(test_approach_triggers_in_the_first_tick_when_the_threshold_is_zero);
-    RUN_TEST(test_a_vehicle_is_in_ready_for_a_tick_at_least);
     RUN_TEST(test_approach_waits_in_ready_for_the_policy_and_the_minimum_stay);
     RUN_TEST(test_ready_hovers_where_it_began_when_no_hover_point_was_given);
     RUN_TEST(test_hover_request_calls_an_approach_back);

@@ -151,8 +151,7 @@ static void check_flip(void)
     must(state->has_policy, "a flip without a policy");
     must(model.wanted == IVL_REQUEST_APPROACH, "a flip that nobody has asked for");
     must(state->policy.n == 2u, "a flip of a policy that expects no landing");
-    must(model.ready_ms > 0, "a flip of a vehicle that was never READY");
-    must(1.0e-3f * (float)model.ready_ms + SLACK_S >= fmaxf(ivl_app.cfg.ready_s_min, 0.001f), "a flip without its time in READY");
+    must(1.0e-3f * (float)model.ready_ms + SLACK_S >= ivl_app.cfg.ready_s_min, "a flip without its time in READY");
     must(sdk.state.velocity.z + 1.0e-3f >= (d_m - 0.02f) * state->policy.theta[0], "a flip outside the policy's region");
     must((s->policy.crc == model.policy_crc) && (s->policy.seq == state->policy.id.seq), "a flip of another policy");
     must(sdk.can_fly && (sdk.vbat_V > 3.0f), "a flip of a vehicle that may not fly");
