@@ -1,6 +1,6 @@
 """Put small faults into the product, one at a time, and ask the quick tests of that place whether they notice.
 
-Run by `make mutants`; writes the third table of docs/RELIABILITY.md. `--scale 0.02` tries a fiftieth of them, and writes
+Run by `make mutants`; writes its table of docs/RELIABILITY.md. `--scale 0.02` tries a fiftieth of them, and writes
 nothing. Each fault is put into a copy of the tree and built by the project's own makefiles, so that what is tested is
 what is built. A fault that does not compile, or that gives the same program, is none. Those that were looked at and
 change nothing that anybody could see stand in tools/mutants_equal.txt, each with its reason.
@@ -201,7 +201,11 @@ def programs(area: Area, path: str) -> list[str]:
     """C test programs of an area, the one of the source's own name first."""
     stem = Path(path).stem
     found = sorted(
-        {p.stem for pattern in area.tests for p in [*ROOT.glob(f"tests/c/{pattern}.c"), *ROOT.glob(f"tests/app/{pattern}.c")]},
+        {
+            p.stem
+            for pattern in area.tests
+            for p in [*ROOT.glob(f"tests/c/{pattern}.c"), *ROOT.glob(f"tests/app/{pattern}.c")]
+        },
         key=lambda name: (not name.endswith(stem), name != "test_app", name == "test_ivl_fuzz", name),
     )
     if not found:
@@ -232,9 +236,28 @@ def is_other_code(mutant: Mutant) -> bool:
 
 def assembly(path: Path, place: str) -> bytes | None:
     """Optimised code of a source in the copy of the tree; None if it does not compile."""
-    folders = ("firmware/core", "firmware/app", "sim_sil", "sim_sil/physics", "sim_sil/world", "sim_sil/cf", "sim_sil/crtp")
+    folders = (
+        "firmware/core",
+        "firmware/app",
+        "sim_sil",
+        "sim_sil/physics",
+        "sim_sil/world",
+        "sim_sil/cf",
+        "sim_sil/crtp",
+    )
     sdk = "sim_sil/cf/sdk" if place.startswith("firmware/app") and not place.endswith("app_cpx.c") else "firmware/sdk"
-    command = ["gcc", "-w", "-std=gnu11", "-O2", "-ffp-contract=off", "-DSDK_ON_HOST", "-isystem", sdk, "-isystem", "firmware/sdk"]
+    command = [
+        "gcc",
+        "-w",
+        "-std=gnu11",
+        "-O2",
+        "-ffp-contract=off",
+        "-DSDK_ON_HOST",
+        "-isystem",
+        sdk,
+        "-isystem",
+        "firmware/sdk",
+    ]
     command += [part for folder in folders for part in ("-I", folder)] + ["-S", "-x", "c", "-o", "-", "-"]
     source = path.read_bytes()
     done = subprocess.run(command, input=source, cwd=TREE, capture_output=True, check=False)
@@ -281,7 +304,8 @@ def try_area(area: Area, number: int, seed: int, equal: dict[tuple[str, str, str
         if verdict.ending != NONE:
             verdicts.append(verdict)
             took_s = time.monotonic() - began_s
-            print(f"{area.name} {len(verdicts)}/{number} {verdict.ending} {verdict.by} {took_s:.0f} s  {mutant}", flush=True)
+            ended = f"{verdict.ending} {verdict.by}".strip()
+            print(f"{area.name} {len(verdicts)}/{number} {ended}, {took_s:.0f} s: {mutant}", flush=True)
     return verdicts
 
 
@@ -317,9 +341,8 @@ def table(results: dict[str, list[Verdict]], seed: int) -> str:
     ]
     for name, verdicts in results.items():
         n = Counter(v.ending for v in verdicts)
-        lines.append(
-            f"| {name} | {len(verdicts)} | {n[FOUND]} | {n[EQUIVALENT]} | {n[SURVIVED]} | {100 * share(verdicts):.1f} % |"
-        )
+        counts = f"{len(verdicts)} | {n[FOUND]} | {n[EQUIVALENT]} | {n[SURVIVED]}"
+        lines.append(f"| {name} | {counts} | {100 * share(verdicts):.1f} % |")
     return "\n".join(lines) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""Random packets for the software vehicle, random sequences of events for the app; writes a table of docs/RELIABILITY.md.
+"""Random packets for the software vehicle, random sequences of events for the app, and their table in the documents.
 
 Run by `make reliability`, which builds both programs with sanitizers before. `--scale 0.01` tries a hundredth, and
 writes nothing. Both run in parts, each with a seed of its own, so that the figures of an interrupted run are known.

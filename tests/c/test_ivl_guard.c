@@ -104,6 +104,17 @@ static void test_rules_have_names(void)
 static void test_rules_have_an_act(void)
 {
     TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act(IVL_RULE_NONE));
+    const int no_rules[] = {(int)IVL_RULE_COUNT, (int)IVL_RULE_COUNT + 1, 255, 256, 65535, 1 << 24, 2147483647};
+    for (size_t i = 0; i < sizeof no_rules / sizeof no_rules[0]; i++)
+    {
+        TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act((ivl_rule_t)no_rules[i]));
+        TEST_ASSERT_FALSE(ivl_guard_discards((ivl_rule_t)no_rules[i]));
+        TEST_ASSERT_EQUAL_STRING("?", ivl_guard_name((ivl_rule_t)no_rules[i]));
+        for (int phase = 0; phase < (int)IVL_PHASE_COUNT; phase++)
+        {
+            TEST_ASSERT_FALSE(ivl_guard_applies((ivl_rule_t)no_rules[i], (ivl_phase_t)phase));
+        }
+    }
     TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act(IVL_RULE_COUNT));
     TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_COUNT, IVL_PHASE_IDLE));
     TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_STATE, IVL_PHASE_COUNT));

@@ -38,28 +38,28 @@ static const float SLACK_S = 0.0045f;  // a tick at 250 Hz, and rounding
 
 typedef enum
 {
-    WAIT,      // a: ms
-    POLICY,    // a: threshold, b: moment
-    NO_GO,     // a policy that expects no landing
-    BROKEN,    // a policy packet with one byte changed: a, b
-    COMMAND,   // a: request, b: 0 as it should be, else an old number or a value out of range
-    WRITE,     // a: which parameter, b: value
-    COMMIT,    // what was written
-    MOTION,    // a: vertical speed, b: along the ceiling
-    PLACE,     // a: height
-    TURN,      // a: attitude
-    TOUCH,     // a: what the accelerometer feels
-    VITALS,    // a: which of them, b: good or bad
-    STOCK,     // a: the stock controller wants to fly or not
-    SWITCH,    // another controller, or the app's start again
-    NOISE,     // a packet of random bytes: a, b seed them
-    READING,   // of a camera
-    TRAITOR,   // only with --traitor
+    WAIT,     // a: ms
+    POLICY,   // a: threshold, b: moment
+    NO_GO,    // a policy that expects no landing
+    BROKEN,   // a policy packet with one byte changed: a, b
+    COMMAND,  // a: request, b: 0 as it should be, else an old number or a value out of range
+    WRITE,    // a: which parameter, b: value
+    COMMIT,   // what was written
+    MOTION,   // a: vertical speed, b: along the ceiling
+    PLACE,    // a: height
+    TURN,     // a: attitude
+    TOUCH,    // a: what the accelerometer feels
+    VITALS,   // a: which of them, b: good or bad
+    STOCK,    // a: the stock controller wants to fly or not
+    SWITCH,   // another controller, or the app's start again
+    NOISE,    // a packet of random bytes: a, b seed them
+    READING,  // of a camera
+    TRAITOR,  // only with --traitor
     EVENTS
 } kind_t;
 
-static const char *const NAMES[EVENTS] = {"wait",   "policy", "no-go", "broken policy", "command", "write", "commit", "motion",  "place",
-                                          "turn",   "touch",  "vitals", "stock",        "switch",  "noise", "reading", "traitor"};
+static const char *const NAMES[EVENTS] = {"wait", "policy", "no-go",  "broken policy", "command", "write", "commit",  "motion", "place",
+                                          "turn", "touch",  "vitals", "stock",         "switch",  "noise", "reading", "traitor"};
 
 typedef struct
 {
@@ -76,22 +76,22 @@ typedef struct
 
 typedef struct
 {
-    bool          heartbeat;     ///< the host repeats what it has asked for
-    uint8_t       wanted;        ///< request that was last sent and not refused
-    bool          has_command;   ///< since the start, a command was taken
-    uint16_t      seq;
-    int           heartbeat_ms;
-    float         v_mps[2];      ///< along the ceiling and up
-    bool          runs;          ///< the app's controller is the one that is called
-    ivl_phase_t   phase;         ///< after the last millisecond
-    int           ready_ms;      ///< in READY without a break
-    int           away_ms;       ///< the link has been down
-    bool          landed;        ///< a flip was begun: motors are off but in it
-    float         rest_ms;       ///< upright, at rest, nobody wants to fly
-    uint32_t      n_trigger, policy_crc, policy_seq, cfg_crc;
-    uint32_t      n_step;        ///< of the stabilizer that was looked at last
-    int           stop_ms;       ///< since a request to stop has left the host; -1: none is under way
-    uint8_t       stop;
+    bool        heartbeat;    ///< the host repeats what it has asked for
+    uint8_t     wanted;       ///< request that was last sent and not refused
+    bool        has_command;  ///< since the start, a command was taken
+    uint16_t    seq;
+    int         heartbeat_ms;
+    float       v_mps[2];  ///< along the ceiling and up
+    bool        runs;      ///< the app's controller is the one that is called
+    ivl_phase_t phase;     ///< after the last millisecond
+    int         ready_ms;  ///< in READY without a break
+    int         away_ms;   ///< the link has been down
+    bool        landed;    ///< a flip was begun: motors are off but in it
+    float       rest_ms;   ///< upright, at rest, nobody wants to fly
+    uint32_t    n_trigger, policy_crc, policy_seq, cfg_crc;
+    uint32_t    n_step;   ///< of the stabilizer that was looked at last
+    int         stop_ms;  ///< since a request to stop has left the host; -1: none is under way
+    uint8_t     stop;
 } model_t;
 
 static model_t     model;
@@ -214,6 +214,12 @@ static void remember(ivl_phase_t phase)
     if ((phase == IVL_PHASE_READY) && (model.phase != IVL_PHASE_READY))
     {
         model.ready_ms = 1;
+    }
+    // the next cycle may be as far as an approach, its end or an abort within a tick
+    if (is_before_trigger(phase) || (phase == IVL_PHASE_ABORTED))
+    {
+        const bool is_new = (model.phase == IVL_PHASE_IDLE) || is_before_trigger(model.phase) || (model.phase == IVL_PHASE_ABORTED);
+        must(is_new, "a cycle that is over goes on");
         model.landed = false;
     }
     if (phase == IVL_PHASE_FLIP)
@@ -363,9 +369,9 @@ static void write_some(uint8_t which, uint8_t value)
         const char *name;
         float       values[4];
     } ROWS[] = {
-        {"ready_s_min", {0.0f, 0.05f, 0.3f, NAN}}, {"host_s_max", {0.5f, 0.2f, 2.0f, 99.0f}}, {"rearm_s", {1.0f, 0.2f, 2.0f, -1.0f}},
-        {"tick_hz", {500.0f, 1000.0f, 250.0f, 333.0f}}, {"attached_s", {1.0f, 0.1f, 0.3f, INFINITY}},
-        {"flip_s_max", {1.0f, 0.05f, 0.2f, 0.0f}},
+        {"ready_s_min", {0.0f, 0.05f, 0.3f, NAN}},    {"host_s_max", {0.5f, 0.2f, 2.0f, 99.0f}},
+        {"rearm_s", {1.0f, 0.2f, 2.0f, -1.0f}},       {"tick_hz", {500.0f, 1000.0f, 250.0f, 333.0f}},
+        {"attached_s", {1.0f, 0.1f, 0.3f, INFINITY}}, {"flip_s_max", {1.0f, 0.05f, 0.2f, 0.0f}},
     };
     const size_t row = which % (sizeof ROWS / sizeof ROWS[0]);
     sdk_double_write_float(ROWS[row].name, ROWS[row].values[value % 4u]);
@@ -373,8 +379,9 @@ static void write_some(uint8_t which, uint8_t value)
 
 static void turn(uint8_t a)
 {
-    static const quaternion_t ATTITUDES[] = {{.w = 1.0f}, {.x = 0.13f, .w = 0.99f}, {.y = 0.26f, .w = 0.966f}, {.y = 1.0f}, {.x = 0.71f, .w = 0.71f}};
-    const quaternion_t        q = ATTITUDES[a % 5u];
+    static const quaternion_t ATTITUDES[] = {
+        {.w = 1.0f}, {.x = 0.13f, .w = 0.99f}, {.y = 0.26f, .w = 0.966f}, {.y = 1.0f}, {.x = 0.71f, .w = 0.71f}};
+    const quaternion_t q = ATTITUDES[a % 5u];
     sdk.state.attitudeQuaternion.x = q.x;
     sdk.state.attitudeQuaternion.y = q.y;
     sdk.state.attitudeQuaternion.z = q.z;
@@ -449,7 +456,8 @@ static void send_noise(uint8_t a, uint8_t b)
 
 static void send_reading(uint8_t a, uint8_t b)
 {
-    const ivl_wire_reading_t packet = {(uint8_t)(a % 5u), 0.005f * (float)(b % 16u), (a % 9u == 8u) ? NAN : 0.2f * (float)b, 0.1f * (float)a};
+    const ivl_wire_reading_t packet = {(uint8_t)(a % 5u), 0.005f * (float)(b % 16u), (a % 9u == 8u) ? NAN : 0.2f * (float)b,
+                                       0.1f * (float)a};
     uint8_t                  bytes[IVL_WIRE_SIZE_MAX];
     deliver(bytes, ivl_wire_put_reading(bytes, &packet));
 }
@@ -538,8 +546,14 @@ static void happen(const event_t *e)
 // ---- sequences
 
 /// Half of the sequences begin with a flight, since few random ones come as far as that.
-static const event_t FLIGHT[] = {{COMMIT, 1, 0},  {STOCK, 1, 0},   {POLICY, 8, 8}, {COMMAND, IVL_REQUEST_HOVER, 0},
-                                 {WAIT, 200, 0},  {PLACE, 60, 0},  {COMMAND, IVL_REQUEST_APPROACH, 0}, {MOTION, 6, 0},
+static const event_t FLIGHT[] = {{COMMIT, 1, 0},
+                                 {STOCK, 1, 0},
+                                 {POLICY, 8, 8},
+                                 {COMMAND, IVL_REQUEST_HOVER, 0},
+                                 {WAIT, 200, 0},
+                                 {PLACE, 60, 0},
+                                 {COMMAND, IVL_REQUEST_APPROACH, 0},
+                                 {MOTION, 6, 0},
                                  {WAIT, 100, 3}};
 
 /// Half of them commands and waits.
