@@ -168,6 +168,45 @@ static void test_rule_bypass_refuses_to_arm_while_motors_are_driven_past_the_cor
     check_rule_of_arming(IVL_RULE_BYPASS, spoil_bypass);
 }
 
+/// One vital with its limit: beyond is larger, or for the battery smaller.
+typedef struct
+{
+    float     *value;
+    float      limit, beyond;
+    ivl_rule_t rule;
+} vital_t;
+
+static void assert_vital(const vital_t *vital, float value, ivl_rule_t expected)
+{
+    fix_to_phase(&fix, IVL_PHASE_READY);
+    fix.in.vitals = good_vitals();
+    *vital->value = value;
+    fix_tick(&fix);
+    assert_rule(expected, fix.state.guard.rule | fix.state.guard.cause);
+    assert_phase((expected == IVL_RULE_NONE) ? IVL_PHASE_READY : IVL_PHASE_ABORTED, &fix);
+}
+
+static void test_each_vital_is_good_at_its_limit_and_bad_one_step_beyond_it(void)
+{
+    fix_init(&fix);
+    const ivl_cfg_t cfg = fix.cfg;
+    ivl_vitals_t   *in = &fix.in.vitals;
+    const vital_t   vitals[] = {
+        {&in->link_age_s, cfg.link_s_max, INFINITY, IVL_RULE_LINK}, {&in->setpoint_age_s, cfg.setpoint_s_max, INFINITY, IVL_RULE_SETPOINT},
+        {&in->host_age_s, cfg.host_s_max, INFINITY, IVL_RULE_HOST}, {&in->p_sigma_m, cfg.p_sigma_m_max, INFINITY, IVL_RULE_UNCERTAIN},
+        {&in->vbat_V, cfg.vbat_V_min, -INFINITY, IVL_RULE_BATTERY},
+    };
+    for (size_t i = 0; i < sizeof vitals / sizeof vitals[0]; i++)
+    {
+        const vital_t *vital = &vitals[i];
+        assert_vital(vital, vital->limit, IVL_RULE_NONE);
+        assert_vital(vital, nextafterf(vital->limit, -vital->beyond), IVL_RULE_NONE);
+        assert_vital(vital, nextafterf(vital->limit, vital->beyond), vital->rule);
+        assert_vital(vital, vital->beyond, vital->rule);
+        assert_vital(vital, NAN, vital->rule);
+    }
+}
+
 static void test_rule_rearm_wants_hover_after_a_landing(void)
 {
     is_tested[IVL_RULE_REARM] = true;
@@ -714,6 +753,7 @@ int main(void)
     RUN_TEST(test_vitals_that_are_not_given_satisfy_every_rule);
     RUN_TEST(test_rule_config_refuses_to_arm_before_a_configuration_is_in_force);
     RUN_TEST(test_rule_bypass_refuses_to_arm_while_motors_are_driven_past_the_core);
+    RUN_TEST(test_each_vital_is_good_at_its_limit_and_bad_one_step_beyond_it);
     RUN_TEST(test_rule_rearm_wants_hover_after_a_landing);
     RUN_TEST(test_rule_battery_rest_refuses_to_arm_on_a_weak_battery);
     RUN_TEST(test_rule_state_aborts_when_the_estimate_is_too_old);

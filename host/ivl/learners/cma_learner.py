@@ -117,7 +117,7 @@ def _plain(value: Any) -> Any:
         return {"array": value.tolist()}
     if isinstance(value, np.random.RandomState):
         kind, key, *rest = value.get_state(legacy=True)
-        return {"generator": [kind, key.tolist(), *rest]}
+        return {"generator": [kind, np.asarray(key).tolist(), *rest]}
     return value.item() if isinstance(value, np.generic) else value
 
 
