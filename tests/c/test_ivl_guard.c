@@ -708,6 +708,69 @@ static void test_lock_out_lasts_until_the_vehicle_rests_upright_and_nobody_asks_
     TEST_ASSERT_TRUE(fix.out.stock_allowed);
 }
 
+/// After a landing: taken down and put somewhere in some state; `n` says which.
+static ivl_in_t put_down(int n, bool is_mild)
+{
+    ivl_in_t    in = good_input();
+    const float half_rad = is_mild ? 0.13f : 0.26f, rate = is_mild ? 0.29f : 0.31f, force = is_mild ? 1.9f : 2.1f;
+    const float s = sinf(half_rad), c = cosf(half_rad);
+    in.vitals = good_vitals();
+    switch (n)
+    {
+    case 0:
+        in.q_WB = (ivl_quat_t){s, 0.0f, 0.0f, c};
+        break;
+    case 1:
+        in.q_WB = (ivl_quat_t){0.0f, -s, 0.0f, c};
+        break;
+    case 2:
+        in.w_B_radps.x = -rate;
+        break;
+    case 3:
+        in.w_B_radps.y = rate;
+        break;
+    case 4:
+        in.w_B_radps.z = -rate;
+        break;
+    case 5:
+        in.f_B_mps2.z += force;
+        break;
+    case 6:
+        in.f_B_mps2.z -= force;
+        break;
+    case 7:
+        in.vitals.given = is_mild;
+        break;
+    case 8:
+        in.vitals.stock_idle = is_mild;
+        break;
+    default:
+        in.p_WB_m.y = is_mild ? 0.5f : NAN;
+        break;
+    }
+    return in;
+}
+
+/// Each condition of rest is spoiled alone, by a little more than it allows, and then by a little less.
+static void test_each_condition_of_rest_alone_keeps_the_lock_out(void)
+{
+    for (int n = 0; n < 10; n++)
+    {
+        bring_to(IVL_PHASE_IDLE);
+        land_and_go_idle();
+        for (int mild = 0; mild < 2; mild++)
+        {
+            const uint64_t now_us = fix.in.t_us;
+            fix.in = put_down(n, mild == 1);
+            fix.in.t_us = fix.in.t_pose_us = now_us;
+            fix_ticks(&fix, (mild == 1) ? fix.cfg.rearm_s - 0.05f : 3.0f);
+            TEST_ASSERT_FALSE_MESSAGE(fix.out.stock_allowed, "locked out");
+        }
+        fix_ticks(&fix, 0.1f);
+        TEST_ASSERT_TRUE_MESSAGE(fix.out.stock_allowed, "rested");
+    }
+}
+
 static void test_lock_out_begins_with_the_trigger_and_survives_the_kill_switch(void)
 {
     const ivl_phase_t from[] = {IVL_PHASE_FLIP, IVL_PHASE_COAST, IVL_PHASE_ATTACHED, IVL_PHASE_DONE};
@@ -786,6 +849,7 @@ int main(void)
     RUN_TEST(test_rule_cue_holds_the_trigger_outside_the_range_of_distance);
     RUN_TEST(test_every_rule_was_tested);
     RUN_TEST(test_lock_out_lasts_until_the_vehicle_rests_upright_and_nobody_asks_for_thrust);
+    RUN_TEST(test_each_condition_of_rest_alone_keeps_the_lock_out);
     RUN_TEST(test_lock_out_begins_with_the_trigger_and_survives_the_kill_switch);
     RUN_TEST(test_lock_out_follows_an_abort_that_has_cut_the_motors_and_a_new_cycle_ends_it);
     return UNITY_END();
