@@ -34,8 +34,6 @@ PAGE = ROOT / "docs" / "RELIABILITY.md"
 EQUAL = ROOT / "tools" / "mutants_equal.txt"
 BEGIN, END = "<!-- measured by tools/mutants.py: begin -->\n", "<!-- measured by tools/mutants.py: end -->\n"
 TREE = ROOT / "build" / "mutants"
-MARK = TREE / "fault"
-"""Names the source that has a fault in the copy, while it has."""
 FLAVOUR = "O0"
 """Compiled and linked soonest."""
 TIME_S = 180.0
@@ -181,20 +179,23 @@ def run_pytest(test: str) -> int:
 
 
 def copy_tree() -> None:
-    """The tree as it is; what was compiled in the copy before is kept, and makefiles compile what is newer."""
+    """The tree as it is; what was compiled in the copy before is kept, and makefiles compile what has changed since."""
     for name in ("firmware", "sim_sil", "tests", "tools", "host", "build/unity"):
-        shutil.rmtree(TREE / name, ignore_errors=True)
-        shutil.copytree(ROOT / name, TREE / name, symlinks=True)
-    for name in ("pyproject.toml", "Makefile", "docs", "CHANGELOG.md", "README.md"):
-        if not (TREE / name).is_symlink():
-            (TREE / name).symlink_to(ROOT / name)
+        wanted = {p.relative_to(ROOT) for p in (ROOT / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        there = {p.relative_to(TREE) for p in (TREE / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        for path in there - wanted:
+            (TREE / path).unlink()
+        for path in wanted:
+            if path not in there or (TREE / path).read_bytes() != (ROOT / path).read_bytes():
+                (TREE / path).parent.mkdir(parents=True, exist_ok=True)
+                # as new, so that it is compiled: the fault of a run that was ended may be in its object
+                shutil.copy(ROOT / path, TREE / path)
     for name in (FLAVOUR, "app"):
         if (ROOT / "build" / name).is_dir() and not (TREE / "build" / name).exists():
             shutil.copytree(ROOT / "build" / name, TREE / "build" / name, symlinks=True)
-    if MARK.exists():
-        # the fault of a run that was ended is in its object still
-        os.utime(TREE / MARK.read_text(encoding="utf-8"))
-        MARK.unlink()
+    for name in ("pyproject.toml", "Makefile", "docs", "CHANGELOG.md", "README.md"):
+        if not (TREE / name).is_symlink():
+            (TREE / name).symlink_to(ROOT / name)
 
 
 def programs(area: Area, path: str) -> list[str]:
@@ -280,15 +281,13 @@ def try_one(area: Area, mutant: Mutant) -> Verdict:
     """Put a fault into the copy, ask, and take it out again."""
     path, original = TREE / mutant.path, ROOT / mutant.path
     source = original.read_text(encoding="utf-8")
-    MARK.write_text(mutant.path, encoding="utf-8")
     path.write_text(mutant.text, encoding="utf-8")
     try:
         return try_python(area, mutant, source) if path.suffix == ".py" else try_c(area, mutant)
     finally:
-        shutil.copy2(original, path)
-        # a source that is newer than its object is compiled again
+        shutil.copy(original, path)
+        # newer than the object that has the fault
         os.utime(path)
-        MARK.unlink()
 
 
 def try_area(area: Area, number: int, seed: int, equal: dict[tuple[str, str, str], str]) -> list[Verdict]:

@@ -139,11 +139,18 @@ static void test_no_rule_aborts_a_flip_or_what_follows_it(void)
 
 static void test_vitals_that_are_not_given_satisfy_every_rule(void)
 {
-    fix_to_phase(&fix, IVL_PHASE_READY);
-    fix.in.vitals = (ivl_vitals_t){.vbat_V = NAN, .link_age_s = 1.0e9f, .host_age_s = NAN, .bypassed = true};
-    fix_ticks(&fix, 0.1f);
-    assert_phase(IVL_PHASE_READY, &fix);
-    assert_rule(IVL_RULE_NONE, fix.state.guard.rule);
+    const ivl_vitals_t none = {
+        .vbat_V = NAN, .link_age_s = 1.0e9f, .setpoint_age_s = NAN, .host_age_s = NAN, .p_sigma_m = INFINITY, .bypassed = true};
+    const ivl_phase_t from[] = {IVL_PHASE_IDLE, IVL_PHASE_READY, IVL_PHASE_APPROACH};
+    for (int i = 0; i < 3; i++)
+    {
+        fix_to_phase(&fix, from[i]);
+        fix.in.vitals = none;
+        fix_request(&fix, (from[i] == IVL_PHASE_APPROACH) ? IVL_REQUEST_APPROACH : IVL_REQUEST_HOVER);
+        fix_ticks(&fix, 0.1f);
+        assert_phase((from[i] == IVL_PHASE_APPROACH) ? IVL_PHASE_APPROACH : IVL_PHASE_READY, &fix);
+        assert_rule(IVL_RULE_NONE, fix.state.guard.cause);
+    }
 }
 
 // ---- to arm
