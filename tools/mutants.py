@@ -78,10 +78,10 @@ AREAS = (
     ),
     Area(
         "mocap",
-        ("host/ivl/mocap/watch.py", "host/ivl/mocap/guard.py", "host/ivl/mocap/tracker.py"),
+        ("host/ivl/mocap/watch.py", "host/ivl/mocap/guard.py"),
         40,
         0.92,
-        ("tests/wire/test_mocap_watch.py", "tests/wire/test_mocap_process.py"),
+        ("tests/wire/test_mocap_watch.py",),
     ),
     Area("store", ("host/ivl/store.py",), 30, 0.92, ("tests/py/test_store.py", "tests/py/test_borders.py")),
 )
