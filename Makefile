@@ -121,7 +121,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 ##@ Tests
 
 # longest first; some mostly compute, some mostly wait; test-wire flies in real time and has the machine for itself
-SLOW_TESTS := test-py pil test-links test-mujoco test-sil test-sweep test-report test-forms test-analysis test-flight test-physics sizes-diff
+SLOW_TESTS := test-py pil test-links test-mutants test-mujoco test-sil test-sweep test-report test-forms test-analysis test-flight test-physics sizes-diff
 
 .PHONY: test
 test: setup-dev toolchain cross-toolchain chromium qt-libraries lint test-c san golden ## everything below, set-up and compilers included
@@ -136,6 +136,8 @@ test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator 
 	@+$(NATIVE) FLAVOUR=release check
 	$(say) 'test-c: Crazyflie app on a stand-in for its SDK, ASan and UBSan'
 	@+$(APP) check
+	$(say) 'test-c: random sequences of events for the app'
+	@+$(APP) sequences
 
 .PHONY: san
 san: toolchain setup-dev $(UNITY)/unity.c ## the same C tests, and landings, under AddressSanitizer and UndefinedBehaviorSanitizer
@@ -190,8 +192,26 @@ test-links: setup-dev build ## flying over a link: the same bits as in process, 
 	$(say) 'test-links: pytest tests/links'
 	@$(BIN)/python -m pytest tests/links $(PYTEST_ARGS)
 
+.PHONY: mutants
+mutants: setup-dev build toolchain $(UNITY)/unity.c ## small faults put into the product, and how many of them the tests find; writes docs/RELIABILITY.md (an hour)
+	$(say) 'mutants: one fault at a time'
+	@$(BIN)/python tools/mutants.py $(MUTANTS_ARGS)
+
+.PHONY: test-mutants
+test-mutants: setup-dev build toolchain $(UNITY)/unity.c ## a few of these faults, each of which must be found
+	$(say) 'test-mutants: a few small faults'
+	@$(BIN)/python tools/mutants.py --only wire --only mocap --scale 0.07
+
+.PHONY: sequences
+sequences: toolchain $(UNITY)/unity.c ## random sequences of host, link and vehicle for the app (SEQUENCES=100000 SEED=1)
+	@+$(APP) sequences SEQUENCES=$(or $(SEQUENCES),100000) SEED=$(or $(SEED),1)
+
 .PHONY: reliability
-reliability: setup-dev build ## damaged files, failing disks, links that lose and restart; writes docs/RELIABILITY.md (30 min)
+reliability: setup-dev build toolchain $(UNITY)/unity.c ## damaged files, failing disks, hostile packets, links that lose and restart; writes docs/RELIABILITY.md (an hour)
+	@+$(APP) build/app/sequences
+	@tools/apt_install.sh $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
+	@+$(NATIVE) FLAVOUR=fuzz fuzz
+	@$(BIN)/python tools/packets.py
 	@mkdir -p build/borders
 	@$(CC) -std=c11 -O1 -Wall -Wextra -Werror -shared -fPIC -o build/borders/faulty_io.so tools/faulty_io.c -ldl
 	@LD_PRELOAD=$(CURDIR)/build/borders/faulty_io.so IVL_FAULTY_IO=$(CURDIR)/build/borders/faulty_io.so \

@@ -1,6 +1,6 @@
 # The Crazyflie app without its SDK.  Called by the Makefile as
 #     make -f tools/app.mk <target>
-# Targets: check (host: unit tests on a stand-in for the SDK), objects (Cortex-M4F: core and app with the SDK's own flags, and their sizes).
+# Targets: check (host: unit tests on a stand-in for the SDK), sequences (host: random sequences of events, SEQUENCES of them), objects (Cortex-M4F: core and app with the SDK's own flags, and their sizes).
 # firmware/sdk declares what the app uses of the SDK; docs/FIRMWARE.md says when it was last linked against the real one.
 
 CROSS ?= arm-none-eabi-
@@ -22,7 +22,9 @@ HOST       := build/app$(OWN)
 HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=all \
               -Wall -Wextra -Wdouble-promotion -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes -Werror \
               -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -Itests/c -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE $(FORMS_FLAGS)
-HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) $(FORMS_SOURCES) tests/app/sdk_double.c tests/app/test_app.c tests/c/default_fixture.c)
+HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) $(FORMS_SOURCES) tests/app/sdk_double.c tests/c/default_fixture.c)
+SEQUENCES  ?= 3000
+SEED       ?= 1
 
 # ---- Cortex-M4F: the SDK's flags, and the one of our Kbuild files
 
@@ -35,12 +37,22 @@ ARM_OBJ   := $(patsubst firmware/%.c,$(ARM)/%.o,$(SOURCES)) $(patsubst $(FORMS)/
 LIBRARY   := memcpy|memset|memcmp|memmove|strlen
 
 .DELETE_ON_ERROR:
-.PHONY: check objects
+.PHONY: check sequences objects
 
 check: $(HOST)/test_app
 	@tools/run_unity.sh $<
 
-$(HOST)/test_app: $(HOST_OBJ) $(HOST)/unity.o
+# a fuzzer that finds nothing must be able to find something: with --traitor it must
+sequences: $(HOST)/sequences
+	@$< $(SEQUENCES) $(SEED)
+	@if $< $(SEQUENCES) $(SEED) --traitor > $(HOST)/traitor.txt; then echo 'error: sequences did not find the traitor' >&2; exit 1; fi
+	@grep -q 'a policy changed in flight' $(HOST)/traitor.txt || { cat $(HOST)/traitor.txt; exit 1; }
+
+$(HOST)/test_app: $(HOST)/tests/app/test_app.o $(HOST_OBJ) $(HOST)/unity.o
+	@echo '  LINK  $@'
+	@$(CC) $(HOST_FLAGS) -o $@ $^ -lm
+
+$(HOST)/sequences: $(HOST)/tests/fuzz/sequences.o $(HOST_OBJ) $(HOST)/unity.o
 	@echo '  LINK  $@'
 	@$(CC) $(HOST_FLAGS) -o $@ $^ -lm
 

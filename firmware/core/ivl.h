@@ -40,7 +40,7 @@ void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state);
 ivl_status_t ivl_reconfigure(ivl_cfg_t *cfg, ivl_state_t *state, const ivl_cfg_t *wanted);
 
 /// Put a policy in force as a whole, or refuse it as a whole (counted in diag.n_policy_refused).
-/// @return IVL_OK; what ivl_policy_check says; IVL_ERR_PHASE after the trigger, until the phase is IDLE again
+/// @return IVL_OK; what ivl_policy_check says; IVL_ERR_PHASE in any phase but IDLE and READY
 ivl_status_t ivl_policy_commit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy);
 
 /// One tick: sensed state -> distance -> cues -> phase (with the trigger) -> maneuver or controller -> mixer -> PWM.

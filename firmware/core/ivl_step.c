@@ -43,9 +43,8 @@ ivl_status_t ivl_reconfigure(ivl_cfg_t *cfg, ivl_state_t *state, const ivl_cfg_t
 
 ivl_status_t ivl_policy_commit(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy)
 {
-    // once go was decided there may be no way back: the policy that was asked is the one that flips
-    const bool   is_decided = state->decision.made && (state->phase == IVL_PHASE_APPROACH);
-    const bool   open = (!state->triggered && !is_decided) || (state->phase == IVL_PHASE_IDLE);
+    // from the begin of an approach to the end of its cycle nothing that it was begun with changes: who asks for an approach has seen the policy
+    const bool   open = (state->phase == IVL_PHASE_IDLE) || (state->phase == IVL_PHASE_READY);
     ivl_status_t status = ivl_policy_check(cfg, policy);
     status = open ? status : IVL_ERR_PHASE;
     if (status == IVL_OK)

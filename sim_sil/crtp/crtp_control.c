@@ -121,7 +121,9 @@ static void write_param(ivl_crtp_t *crtp, uint16_t id, const char *text, char *r
     }
     else
     {
+        const ivl_crtp_fault_cfg_t before = crtp->own.fault;
         (void)ivl_crtp_params_write(crtp, id, value.bytes);
+        ivl_crtp_own_keep(&crtp->own, &before);
     }
 }
 

@@ -16,6 +16,7 @@ enum
     PACKETS_A_TURN = 256,  // from the socket, then the vehicle gets its turn
     BURST = 64,            // packets that fit into any client's buffer at once
     WAIT_US_MAX = 100000,  // a signal is noticed within this
+    MEET_US = 10000,       // others are answered so often: what they send costs the client nothing
     DATAGRAM_BYTES = 256
 };
 
@@ -65,9 +66,14 @@ static void send_null(ivl_crtp_loop_t *loop, uint64_t peer)
 
 // ---- clients
 
+static void own_changed(void *context);
+
+// a client's faults end with it, or it could lock out everybody who comes after
 static void end_session(ivl_crtp_loop_t *loop)
 {
     ivl_crtp_link(&loop->crtp, false);
+    loop->crtp.own.fault = loop->crtp.own.fault_kept;
+    own_changed(loop);
 }
 
 // Another one wants the vehicle.  A packet to the client shows whether he is still there: if his socket is closed, the system says so.
@@ -75,9 +81,14 @@ static void meet_foreigner(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
 {
     char text[40];
     loop->crtp.own.n_foreign++;
-    send_null(loop, loop->session.peer);
-    if (ivl_crtp_is_link_source(d))
+    if (loop->now_us - loop->met_us >= MEET_US)
     {
+        loop->met_us = loop->now_us;
+        send_null(loop, loop->session.peer);
+    }
+    if (ivl_crtp_is_link_source(d) && (loop->now_us - loop->told_us >= MEET_US))
+    {
+        loop->told_us = loop->now_us;
         ivl_crtp_packet_t packet = ivl_crtp_packet(IVL_CRTP_PORT_CONSOLE, 0);
         ivl_crtp_udp_text(loop->session.peer, text, sizeof text);
         ivl_crtp_put_bytes(&packet, "Busy: ", 6);
@@ -350,7 +361,7 @@ bool ivl_crtp_loop_open(ivl_crtp_loop_t *loop, ivl_cf_t *cf, const ivl_crtp_loop
     loop->crtp.address = cfg->address;
     loop->crtp.own.time.speed_factor = cfg->speed_factor;
     loop->crtp.own.time.lockstep = cfg->lockstep ? 1u : 0u;
-    loop->crtp.own.fault = cfg->fault;
+    loop->crtp.own.fault = loop->crtp.own.fault_kept = cfg->fault;
     ivl_crtp_params_take_defaults(&loop->crtp);
     loop->faults.cfg = cfg->fault;
     loop->fd = cfg->fd;

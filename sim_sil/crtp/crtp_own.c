@@ -4,7 +4,11 @@
 
 #include <string.h>
 
+static const float SPEED_MIN = 0.001f;  // but for 0, which is no pace at all
 static const float SPEED_MAX = 1000.0f;
+
+// so long nobody reaches the vehicle at most, whoever asks for it
+static const uint32_t AWAY_MS_MAX = 60000u;
 
 static float clamped(float value, float lo, float hi, float otherwise)
 {
@@ -65,5 +69,19 @@ size_t ivl_crtp_own_logs(ivl_crtp_own_t *own, ivl_cf_log_t *rows)
 void ivl_crtp_own_clamp(ivl_crtp_own_t *own)
 {
     IVL_CRTP_FAULTS(CLAMP_ROW)
-    own->time.speed_factor = clamped(own->time.speed_factor, 0.0f, SPEED_MAX, 1.0f);
+    const float speed = clamped(own->time.speed_factor, 0.0f, SPEED_MAX, 1.0f);
+    own->time.speed_factor = ((speed > 0.0f) && (speed < SPEED_MIN)) ? SPEED_MIN : speed;
+    own->freeze_ms = (own->freeze_ms < AWAY_MS_MAX) ? own->freeze_ms : AWAY_MS_MAX;
+    own->cut_ms = (own->cut_ms < AWAY_MS_MAX) ? own->cut_ms : AWAY_MS_MAX;
+}
+
+#define KEEP_ROW(ctype, member, unit, lo, hi, doc)                                                                                         \
+    if (memcmp(&own->fault.member, &before->member, sizeof before->member) != 0)                                                           \
+    {                                                                                                                                      \
+        own->fault_kept.member = own->fault.member;                                                                                        \
+    }
+
+void ivl_crtp_own_keep(ivl_crtp_own_t *own, const ivl_crtp_fault_cfg_t *before)
+{
+    IVL_CRTP_FAULTS(KEEP_ROW)
 }

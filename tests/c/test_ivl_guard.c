@@ -10,11 +10,6 @@ static bool              is_tested[IVL_RULE_COUNT];
 
 typedef void (*spoiler_t)(ivl_in_t *in);
 
-static ivl_vitals_t good_vitals(void)
-{
-    return (ivl_vitals_t){.given = true, .configured = true, .can_fly = true, .stock_idle = true, .vbat_V = 4.0f};
-}
-
 static bool is_before_trigger(ivl_phase_t phase)
 {
     return (phase == IVL_PHASE_IDLE) || (phase == IVL_PHASE_READY) || (phase == IVL_PHASE_APPROACH) || (phase == IVL_PHASE_LEVEL_OUT);
@@ -109,6 +104,17 @@ static void test_rules_have_names(void)
 static void test_rules_have_an_act(void)
 {
     TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act(IVL_RULE_NONE));
+    const int no_rules[] = {(int)IVL_RULE_COUNT, (int)IVL_RULE_COUNT + 1, 255, 256, 65535, 1 << 24, 2147483647};
+    for (size_t i = 0; i < sizeof no_rules / sizeof no_rules[0]; i++)
+    {
+        TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act((ivl_rule_t)no_rules[i]));
+        TEST_ASSERT_FALSE(ivl_guard_discards((ivl_rule_t)no_rules[i]));
+        TEST_ASSERT_EQUAL_STRING("?", ivl_guard_name((ivl_rule_t)no_rules[i]));
+        for (int phase = 0; phase < (int)IVL_PHASE_COUNT; phase++)
+        {
+            TEST_ASSERT_FALSE(ivl_guard_applies((ivl_rule_t)no_rules[i], (ivl_phase_t)phase));
+        }
+    }
     TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act(IVL_RULE_COUNT));
     TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_COUNT, IVL_PHASE_IDLE));
     TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_STATE, IVL_PHASE_COUNT));
@@ -133,11 +139,18 @@ static void test_no_rule_aborts_a_flip_or_what_follows_it(void)
 
 static void test_vitals_that_are_not_given_satisfy_every_rule(void)
 {
-    fix_to_phase(&fix, IVL_PHASE_READY);
-    fix.in.vitals = (ivl_vitals_t){.vbat_V = NAN, .link_age_s = 1.0e9f, .host_age_s = NAN, .bypassed = true};
-    fix_ticks(&fix, 0.1f);
-    assert_phase(IVL_PHASE_READY, &fix);
-    assert_rule(IVL_RULE_NONE, fix.state.guard.rule);
+    const ivl_vitals_t none = {
+        .vbat_V = NAN, .link_age_s = 1.0e9f, .setpoint_age_s = NAN, .host_age_s = NAN, .p_sigma_m = INFINITY, .bypassed = true};
+    const ivl_phase_t from[] = {IVL_PHASE_IDLE, IVL_PHASE_READY, IVL_PHASE_APPROACH};
+    for (int i = 0; i < 3; i++)
+    {
+        fix_to_phase(&fix, from[i]);
+        fix.in.vitals = none;
+        fix_request(&fix, (from[i] == IVL_PHASE_APPROACH) ? IVL_REQUEST_APPROACH : IVL_REQUEST_HOVER);
+        fix_ticks(&fix, 0.1f);
+        assert_phase((from[i] == IVL_PHASE_APPROACH) ? IVL_PHASE_APPROACH : IVL_PHASE_READY, &fix);
+        assert_rule(IVL_RULE_NONE, fix.state.guard.cause);
+    }
 }
 
 // ---- to arm
@@ -160,6 +173,45 @@ static void spoil_bypass(ivl_in_t *in)
 static void test_rule_bypass_refuses_to_arm_while_motors_are_driven_past_the_core(void)
 {
     check_rule_of_arming(IVL_RULE_BYPASS, spoil_bypass);
+}
+
+/// One vital with its limit: beyond is larger, or for the battery smaller.
+typedef struct
+{
+    float     *value;
+    float      limit, beyond;
+    ivl_rule_t rule;
+} vital_t;
+
+static void assert_vital(const vital_t *vital, float value, ivl_rule_t expected)
+{
+    fix_to_phase(&fix, IVL_PHASE_READY);
+    fix.in.vitals = good_vitals();
+    *vital->value = value;
+    fix_tick(&fix);
+    assert_rule(expected, fix.state.guard.rule | fix.state.guard.cause);
+    assert_phase((expected == IVL_RULE_NONE) ? IVL_PHASE_READY : IVL_PHASE_ABORTED, &fix);
+}
+
+static void test_each_vital_is_good_at_its_limit_and_bad_one_step_beyond_it(void)
+{
+    fix_init(&fix);
+    const ivl_cfg_t cfg = fix.cfg;
+    ivl_vitals_t   *in = &fix.in.vitals;
+    const vital_t   vitals[] = {
+        {&in->link_age_s, cfg.link_s_max, INFINITY, IVL_RULE_LINK}, {&in->setpoint_age_s, cfg.setpoint_s_max, INFINITY, IVL_RULE_SETPOINT},
+        {&in->host_age_s, cfg.host_s_max, INFINITY, IVL_RULE_HOST}, {&in->p_sigma_m, cfg.p_sigma_m_max, INFINITY, IVL_RULE_UNCERTAIN},
+        {&in->vbat_V, cfg.vbat_V_min, -INFINITY, IVL_RULE_BATTERY},
+    };
+    for (size_t i = 0; i < sizeof vitals / sizeof vitals[0]; i++)
+    {
+        const vital_t *vital = &vitals[i];
+        assert_vital(vital, vital->limit, IVL_RULE_NONE);
+        assert_vital(vital, nextafterf(vital->limit, -vital->beyond), IVL_RULE_NONE);
+        assert_vital(vital, nextafterf(vital->limit, vital->beyond), vital->rule);
+        assert_vital(vital, vital->beyond, vital->rule);
+        assert_vital(vital, NAN, vital->rule);
+    }
 }
 
 static void test_rule_rearm_wants_hover_after_a_landing(void)
@@ -663,6 +715,69 @@ static void test_lock_out_lasts_until_the_vehicle_rests_upright_and_nobody_asks_
     TEST_ASSERT_TRUE(fix.out.stock_allowed);
 }
 
+/// After a landing: taken down and put somewhere in some state; `n` says which.
+static ivl_in_t put_down(int n, bool is_mild)
+{
+    ivl_in_t    in = good_input();
+    const float half_rad = is_mild ? 0.13f : 0.26f, rate = is_mild ? 0.29f : 0.31f, force = is_mild ? 1.9f : 2.1f;
+    const float s = sinf(half_rad), c = cosf(half_rad);
+    in.vitals = good_vitals();
+    switch (n)
+    {
+    case 0:
+        in.q_WB = (ivl_quat_t){s, 0.0f, 0.0f, c};
+        break;
+    case 1:
+        in.q_WB = (ivl_quat_t){0.0f, -s, 0.0f, c};
+        break;
+    case 2:
+        in.w_B_radps.x = -rate;
+        break;
+    case 3:
+        in.w_B_radps.y = rate;
+        break;
+    case 4:
+        in.w_B_radps.z = -rate;
+        break;
+    case 5:
+        in.f_B_mps2.z += force;
+        break;
+    case 6:
+        in.f_B_mps2.z -= force;
+        break;
+    case 7:
+        in.vitals.given = is_mild;
+        break;
+    case 8:
+        in.vitals.stock_idle = is_mild;
+        break;
+    default:
+        in.p_WB_m.y = is_mild ? 0.5f : NAN;
+        break;
+    }
+    return in;
+}
+
+/// Each condition of rest is spoiled alone, by a little more than it allows, and then by a little less.
+static void test_each_condition_of_rest_alone_keeps_the_lock_out(void)
+{
+    for (int n = 0; n < 10; n++)
+    {
+        bring_to(IVL_PHASE_IDLE);
+        land_and_go_idle();
+        for (int mild = 0; mild < 2; mild++)
+        {
+            const uint64_t now_us = fix.in.t_us;
+            fix.in = put_down(n, mild == 1);
+            fix.in.t_us = fix.in.t_pose_us = now_us;
+            fix_ticks(&fix, (mild == 1) ? fix.cfg.rearm_s - 0.05f : 3.0f);
+            TEST_ASSERT_FALSE_MESSAGE(fix.out.stock_allowed, "locked out");
+        }
+        fix_ticks(&fix, 0.1f);
+        TEST_ASSERT_TRUE_MESSAGE(fix.out.stock_allowed, "rested");
+    }
+}
+
 static void test_lock_out_begins_with_the_trigger_and_survives_the_kill_switch(void)
 {
     const ivl_phase_t from[] = {IVL_PHASE_FLIP, IVL_PHASE_COAST, IVL_PHASE_ATTACHED, IVL_PHASE_DONE};
@@ -708,6 +823,7 @@ int main(void)
     RUN_TEST(test_vitals_that_are_not_given_satisfy_every_rule);
     RUN_TEST(test_rule_config_refuses_to_arm_before_a_configuration_is_in_force);
     RUN_TEST(test_rule_bypass_refuses_to_arm_while_motors_are_driven_past_the_core);
+    RUN_TEST(test_each_vital_is_good_at_its_limit_and_bad_one_step_beyond_it);
     RUN_TEST(test_rule_rearm_wants_hover_after_a_landing);
     RUN_TEST(test_rule_battery_rest_refuses_to_arm_on_a_weak_battery);
     RUN_TEST(test_rule_state_aborts_when_the_estimate_is_too_old);
@@ -740,6 +856,7 @@ int main(void)
     RUN_TEST(test_rule_cue_holds_the_trigger_outside_the_range_of_distance);
     RUN_TEST(test_every_rule_was_tested);
     RUN_TEST(test_lock_out_lasts_until_the_vehicle_rests_upright_and_nobody_asks_for_thrust);
+    RUN_TEST(test_each_condition_of_rest_alone_keeps_the_lock_out);
     RUN_TEST(test_lock_out_begins_with_the_trigger_and_survives_the_kill_switch);
     RUN_TEST(test_lock_out_follows_an_abort_that_has_cut_the_motors_and_a_new_cycle_ends_it);
     return UNITY_END();

@@ -58,8 +58,9 @@ static void approach(float p_min, float log_odds, float threshold_per_s)
     policy.theta[9] = p_min;
     policy.theta[10] = log_odds;
     policy.id.crc = ivl_policy_crc(&policy);
-    fix_to_phase(&fix, IVL_PHASE_APPROACH);
+    fix_to_phase(&fix, IVL_PHASE_READY);
     TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix.cfg, &fix.state, &policy));
+    fix_request(&fix, IVL_REQUEST_APPROACH);
 }
 
 /// Straight up at a speed, tick by tick, until the phase is another one or the ceiling is reached.

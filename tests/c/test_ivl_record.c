@@ -30,14 +30,20 @@ static void request(ivl_request_t what)
     tick();
 }
 
-static void start_approach(int n_ready)
+static void start_approach_with(const ivl_policy_t *policy, int n_ready)
 {
     fix_init(&fix);
-    fix_policy(&fix, 4.0f, 0.008f);
+    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix.cfg, &fix.state, policy));
     tick();
     request(IVL_REQUEST_HOVER);
     ticks(n_ready);
     request(IVL_REQUEST_APPROACH);
+}
+
+static void start_approach(int n_ready)
+{
+    const ivl_policy_t policy = constant_policy(7, 4.0f, 0.008f);
+    start_approach_with(&policy, n_ready);
 }
 
 static void trigger(void)
@@ -112,9 +118,8 @@ static void test_flip_is_recorded_with_what_was_before_it(void)
 static void test_a_no_go_is_recorded_with_its_decision_and_its_highest_point(void)
 {
     ivl_record_init(&recorder);
-    start_approach(1000);
     const ivl_policy_t policy = no_go_policy(8);
-    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix.cfg, &fix.state, &policy));
+    start_approach_with(&policy, 1000);
     fix.in.p_WB_m.z = 1.6f;
     fix.in.v_WB_mps.z = 2.5f;
     tick();
@@ -144,9 +149,8 @@ static void test_a_no_go_is_recorded_with_its_decision_and_its_highest_point(voi
 static void test_the_next_approach_of_the_same_cycle_is_a_recording_of_its_own(void)
 {
     ivl_record_init(&recorder);
-    start_approach(10);
     const ivl_policy_t no_go = no_go_policy(8), go = constant_policy(9, 4.0f, 0.008f);
-    TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix.cfg, &fix.state, &no_go));
+    start_approach_with(&no_go, 10);
     fix.in.p_WB_m.z = 1.6f;
     fix.in.v_WB_mps.z = 2.5f;
     tick();

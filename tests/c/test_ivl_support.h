@@ -78,6 +78,12 @@ static inline ivl_in_t good_input(void)
                       .cmd = {.p_hover_W_m = {0.0f, 0.0f, 1.0f}, .speed_mps = 2.5f, .angle_rad = 1.2f}};
 }
 
+/// Of a vehicle that may fly.
+static inline ivl_vitals_t good_vitals(void)
+{
+    return (ivl_vitals_t){.given = true, .configured = true, .can_fly = true, .stock_idle = true, .vbat_V = 4.0f};
+}
+
 static inline void fix_init(fix_t *fix)
 {
     memset(fix, 0, sizeof *fix);
@@ -135,17 +141,17 @@ static inline void fix_to_phase(fix_t *fix, ivl_phase_t phase)
     {
         return;
     }
+    if (phase == IVL_PHASE_LEVEL_OUT)
+    {
+        const ivl_policy_t policy = no_go_policy(8);
+        TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix->cfg, &fix->state, &policy));
+    }
     fix_request(fix, IVL_REQUEST_APPROACH);
     if (phase == IVL_PHASE_APPROACH)
     {
         return;
     }
     // closing at 2.5 m/s, 0.5 m below the ceiling: RREV = 5
-    if (phase == IVL_PHASE_LEVEL_OUT)
-    {
-        const ivl_policy_t policy = no_go_policy(8);
-        TEST_ASSERT_EQUAL_INT(IVL_OK, ivl_policy_commit(&fix->cfg, &fix->state, &policy));
-    }
     fix->in.v_WB_mps.z = 2.5f;
     fix->in.p_WB_m.z = 1.6f;
     fix_tick(fix);

@@ -54,6 +54,10 @@ def _elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 # rollout
 
 
+def test_the_version_is_told(capsys: Capture) -> None:
+    assert ok(["--version"], capsys) == f"ivl {ivl.__version__}\n"
+
+
 def test_rollout_prints_the_outcome_by_name(capsys: Capture) -> None:
     data = json_of(LANDING, capsys)
     assert data["n_legs"] == 4

@@ -1,7 +1,10 @@
+import json
+
 import cmaes
 import numpy as np
 import pytest
 
+from ivl.errors import LearnerError
 from ivl.learners.cma_learner import CMALearner
 
 
@@ -61,3 +64,67 @@ def test_the_population_option_overrides_the_episode_length() -> None:
     theta = learner.ask()
     learner.tell(theta, returns(theta))
     assert (learner.result.mu != before).any()
+
+
+CORNERS = [(1.0, 1.0), (1.0, -1.0), (-1.0, 0.3), (0.0, -1.0)]
+
+
+@pytest.mark.parametrize("lr_adapt", [False, True])
+@pytest.mark.parametrize("slope", CORNERS)
+def test_a_best_policy_at_a_bound_is_found_with_a_spread_within_the_box(
+    slope: tuple[float, float], lr_adapt: bool
+) -> None:
+    lo, hi = np.array([1.0, 0.0]), np.array([8.0, 10.0])
+
+    def linear(theta: np.ndarray) -> np.ndarray:
+        return np.asarray(200.0 + (theta - lo) / (hi - lo) @ (100.0 * np.array(slope)))
+
+    ends = [linear(np.array([[a, b]]))[0] for a in (lo[0], hi[0]) for b in (lo[1], hi[1])]
+    for seed in range(3):
+        learner = CMALearner([4.0, 5.0], [1.5, 1.5], bounds=np.stack([lo, hi], 1), seed=seed, lr_adapt=lr_adapt)
+        for _ in range(70):
+            theta = learner.ask()
+            learner.tell(theta, linear(theta))
+            assert (learner.result.sigma <= (hi - lo) * (1.0 + 1e-9)).all()
+        found = linear(learner.result.recommended[None])[0]
+        assert (found - min(ends)) / (max(ends) - min(ends)) >= 0.95
+
+
+@pytest.mark.parametrize("lr_adapt", [False, True])
+def test_the_state_does_not_grow_and_a_loaded_search_goes_on_bit_for_bit(lr_adapt: bool) -> None:
+    learner = CMALearner([4.0, 5.0], [1.5, 1.5], bounds=[[1, 8], [0, 10]], n_rollouts=5, seed=4, lr_adapt=lr_adapt)
+    sizes = []
+    for episode in range(60):
+        theta = learner.ask()
+        learner.tell(theta[:3], returns(theta[:3]))
+        if episode % 20 == 0:
+            text = json.dumps(learner.state_dict(), allow_nan=False)
+            sizes.append(len(text))
+            again = CMALearner(
+                [4.0, 5.0], [1.5, 1.5], bounds=[[1, 8], [0, 10]], n_rollouts=5, seed=4, lr_adapt=lr_adapt
+            )
+            again.load_state_dict(json.loads(text))
+            for _ in range(6):
+                a, b = learner.ask(), again.ask()
+                assert a.tobytes() == b.tobytes()
+                learner.tell(a, returns(a))
+                again.tell(b, returns(b))
+            assert json.dumps(again.state_dict()) == json.dumps(learner.state_dict())
+    assert max(sizes) < 1.1 * min(sizes) + 500
+
+
+def test_what_leaves_no_distribution_is_refused_and_changes_nothing() -> None:
+    learner = CMALearner([4.0, 5.0], [1.5, 1.5], n_rollouts=8, seed=1, lr_adapt=True)
+    before = json.dumps(learner.state_dict())
+    with pytest.raises(LearnerError, match="no distribution that it could draw from"):
+        learner.tell([[4.0, 5.0]] * 8, [1.0] * 8)
+    assert json.dumps(learner.state_dict()) == before
+    assert np.isfinite(learner.ask()).all()
+
+
+def test_a_state_of_another_version_of_the_package_is_refused_by_name() -> None:
+    learner = CMALearner([4.0, 5.0], [1.5, 1.5], seed=1)
+    state = learner.state_dict()
+    state["search"]["cma"]["_new"] = 1.0
+    with pytest.raises(LearnerError, match="another version of cmaes has _new"):
+        learner.load_state_dict(state)

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from ivl.policy.shape import GO, General
 from ivl.seeds import Purpose
 from ivl.sweep import config as sweep_config
 from ivl.task import settings_of
+
+ROOT = Path(__file__).parents[2]
 
 STEEP = Region(speeds_mps=[2.3, 2.7], angles_deg=[75.0, 90.0])
 Capture = pytest.CaptureFixture[str]
@@ -251,6 +254,36 @@ def test_a_file_reads_back_as_it_was(learned: PolicyFile, by_hand: PolicyFile, t
         assert again.values == policy.values
         assert again.checksum == policy.checksum
         assert [entry.name for entry in tmp_path.iterdir()] == ["p.yaml"]
+
+
+def test_own_files_of_a_task_go_with_the_policy(by_hand: PolicyFile, tmp_path: Path) -> None:
+    """No path of the machine that wrote it: the folder is moved, the originals are gone."""
+    own, there, elsewhere = tmp_path / "my own", tmp_path / "there", tmp_path / "else where"
+    own.mkdir()
+    there.mkdir()
+    task = by_hand.tasks[0]
+    vehicle, gears = own / "my vehicle.yaml", own / "gears.yml"
+    shutil.copy(ROOT / "host" / "ivl" / "vehicles" / f"{task.vehicle}.yaml", vehicle)
+    shutil.copy(ROOT / "host" / "ivl" / "gears" / f"{task.gear_set}.yaml", gears)
+    changed = task.model_copy(update={"vehicle": str(vehicle), "gear_set": str(gears)})
+    policy = by_hand.model_copy(update={"tasks": [changed, task]}).sealed()
+    file.save(policy, there / "p.yaml")
+    assert str(tmp_path) not in (there / "p.yaml").read_text()
+    shutil.rmtree(own)
+    there.rename(elsewhere)
+    again = file.load(elsewhere / "p.yaml")
+    assert again.tasks[1] == task
+    assert again.tasks[0].vehicle.startswith(f"{elsewhere}/files/my vehicle-")
+    flown = [Place.of(t).world.rollouts(2.5, 80.0, *again.values, form=again.form) for t in (again.tasks[0], task)]
+    assert flown[0].tobytes() == flown[1].tobytes()
+    # written again elsewhere it is the same file
+    there.mkdir()
+    file.save(again, there / "p.yaml")
+    assert (there / "p.yaml").read_bytes() == (elsewhere / "p.yaml").read_bytes()
+    # a copy that is gone is said in one line
+    shutil.rmtree(elsewhere / "files")
+    with pytest.raises(ConfigError, match="my vehicle-"):
+        Place.of(file.load(elsewhere / "p.yaml").tasks[0])
 
 
 def test_a_file_of_numbers_alone_is_enough(by_hand: PolicyFile, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import signal
 import struct
 import time
 
+import pytest
 from cflib.crazyflie.log import LogConfig
 
 from ivl.silproc import SilProcess
@@ -133,6 +134,35 @@ def test_a_cut_ends_by_itself(sil, Raw, wait_for):
         sil.set("fault.cut_ms", 50)
         wait_for("the end of the cut", lambda: sil.get("fault.cut_ms") == 0)
         client.connect()
+
+
+@pytest.mark.parametrize(("name", "value"), [("loss", 1.0), ("duplicate", 0.75), ("jitter_ms", 3.0)])
+def test_faults_of_a_client_end_with_it_and_those_of_the_operator_stay(sil, Raw, wait_for, name, value):
+    """One packet must not lock out everybody who comes after it."""
+    sil.set("fault.reorder", 0.25)
+    with Raw(sil.uri) as client:
+        client.connect()
+        client.send(b"\x2f\x00fault\0" + name.encode() + b"\0\x06" + struct.pack("<f", value))
+        wait_for("the fault", lambda: sil.get(f"fault.{name}") == value)
+    wait_for("the client's end", lambda: sil.get(f"fault.{name}") == 0.0)
+    assert sil.get("fault.reorder") == 0.25
+    sil.set("fault.reorder", 0.0)
+    with Raw(sil.uri) as client:
+        client.connect()
+
+
+@pytest.mark.parametrize("name", ["freeze_ms", "cut_ms"])
+@pytest.mark.parametrize("value", [60001, 2**31, 2**32 - 1])
+def test_a_vehicle_is_away_for_a_minute_at_most(sil, name, value):
+    sil.set(f"fault.{name}", value)
+    assert sil.get(f"fault.{name}") == 60000
+    sil.set(f"fault.{name}", 0)
+
+
+@pytest.mark.parametrize("value", [1e-42, 1e-20, 0.0009])
+def test_a_pace_that_is_next_to_none_is_a_thousandth(sil, value):
+    sil.set("sil.speed_factor", value)
+    assert sil.get("sil.speed_factor") == pytest.approx(0.001)
 
 
 def test_loss_is_as_asked_and_seeded(world, Raw, wait_for):

@@ -12,7 +12,7 @@ from ivl.links.packets import Phase
 from ivl.mocap import config as configs
 from ivl.mocap.config import MocapConfig
 from ivl.mocap.guard import LossGuard
-from ivl.mocap.watch import Pose, Status, Watch, make_pose
+from ivl.mocap.watch import VELOCITY_S, Pose, Status, Watch, _Past, make_pose
 
 DT_S = 0.01
 LEVEL = (0.0, 0.0, 0.0, 1.0)
@@ -133,6 +133,27 @@ def test_frozen_pose_is_seen_in_time_and_as_old_as_its_first_frame() -> None:
     thawed = [track.at(0.5e-2) for _ in range(30)]
     assert thawed[0] is Status.SETTLING
     assert thawed[-1] is Status.GOOD
+
+
+def test_a_frozen_pose_is_not_sent_from_the_limit_on() -> None:
+    """Times that a float holds exactly: one step before the limit, at the limit, after it."""
+    step_s, watch = 0.03125, Watch(config(frozen_s=0.25, settle_s=0.125, lost_s=0.0625))
+    for n in range(6):
+        watch.take(step_s * n, Pose((0.1, 0.2, 1.0 + 1e-6 * (n + 1)), LEVEL))
+    frozen = Pose((0.1, 0.2, 1.0), LEVEL)
+    believed = [watch.take(step_s * (6 + n), frozen) is not None for n in range(12)]
+    assert believed == [True] * 8 + [False] * 4
+    assert watch.counts.n_frozen == 1
+
+
+def test_the_velocity_is_that_of_the_last_thirty_milliseconds() -> None:
+    """A shorter time would make metres a second of a camera's noise, a longer one would forget that a body turns."""
+    for step_s in (0.01, 0.004, 0.02):
+        past = _Past()
+        for n in range(40):
+            past.add(step_s * n, Pose((0.001 * n * n, 0.0, 1.0), LEVEL))
+        span_s = past.motion(config()).span_s
+        assert VELOCITY_S - 1e-9 <= span_s <= VELOCITY_S + step_s + 1e-9
 
 
 def test_resting_body_with_noise_is_not_frozen() -> None:

@@ -8,10 +8,11 @@ import os
 import sqlite3
 import sys
 from contextlib import suppress
+from typing import Annotated
 
 import typer
 
-from ivl import files
+from ivl import __version__, files
 from ivl.cli import (
     bench,
     can_gateway,
@@ -42,6 +43,23 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
+
+
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"ivl {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version, and stop.")
+    ] = False,
+) -> None:
+    del version
+
+
 app.command("learn", help=learn.HELP, short_help="Learn to land, and judge what was learned.")(learn.learn)
 app.command("rollout", help=rollout.HELP)(rollout.rollout)
 app.command("sweep", help=sweep.HELP, short_help="Learn over a grid of approaches and landing gears.")(sweep.sweep)

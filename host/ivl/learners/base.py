@@ -92,11 +92,7 @@ class Learner(ABC):
         self.mu0, self.sigma0 = _vector("mu0", mu0), _vector("sigma0", sigma0)
         self.lo, self.hi = _bounds(bounds, self.mu0.size, self.needs_bounds)
         self._check_start()
-        if isinstance(n_rollouts, bool) or not isinstance(n_rollouts, int) or n_rollouts < 1:
-            raise LearnerError(f"n_rollouts: value {n_rollouts!r} must be a whole number >= 1")
-        if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-            raise LearnerError(f"seed: value {seed!r} must be a whole number >= 0")
-        self.n_rollouts, self.seed = n_rollouts, seed
+        self.n_rollouts, self.seed = _whole("n_rollouts", n_rollouts, 1), _whole("seed", seed, 0)
         try:
             self.options = self.Options.model_validate(options)
         except ValidationError as error:
@@ -129,10 +125,7 @@ class Learner(ABC):
 
     def ask(self, n: int | None = None) -> FloatArray:
         """Draw policies to fly, shape (n, dim), inside the bounds; `n` omitted: `n_rollouts`."""
-        n = self.n_rollouts if n is None else n
-        if isinstance(n, bool) or not isinstance(n, int) or n < 1:
-            raise LearnerError(f"ask: n: value {n!r} must be a whole number >= 1")
-        return self._ask(n)
+        return self._ask(self.n_rollouts if n is None else _whole("ask: n", n, 1))
 
     def tell(
         self, theta: npt.ArrayLike, rewards: npt.ArrayLike, meta: Mapping[str, npt.ArrayLike] | None = None
@@ -254,6 +247,13 @@ def draw_truncated(
         theta[row, column] = rng.normal(mu[column], sigma[column])
         missing = (theta < lo) | (theta > hi)
     return theta
+
+
+def _whole(name: str, value: Any, least: int) -> int:
+    """A whole number, those of numpy included."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < least:
+        raise LearnerError(f"{name}: value {value!r} must be a whole number >= {least}")
+    return int(value)
 
 
 def _array(name: str, value: npt.ArrayLike) -> FloatArray:

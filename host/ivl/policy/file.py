@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ivl import files, forms, native, yamlfile
+from ivl import files, forms, native, references, yamlfile
 from ivl.errors import ArgumentError, ConfigError
 from ivl.experiment import LearnerChoice
 from ivl.forms import Form
@@ -146,11 +146,18 @@ def make(
 def save(policy: PolicyFile, path: Path) -> None:
     """Write a policy; a file that is there is replaced as a whole.
 
+    Own files that its tasks name are copied into the folder `files` beside it, so that both can be moved together.
+
     Raises:
-        ConfigError: The file cannot be written.
+        ConfigError: The file cannot be written, or one of its tasks cannot be read.
     """
+    packed = [references.pack(task) for task in policy.tasks]
+    named = policy.model_copy(update={"tasks": [task for task, _ in packed]})
+    named = named if policy.digest == NONE else named.sealed()
     try:
-        files.write(path, _text(policy))
+        for _, copies in packed:
+            references.save(copies, path.parent)
+        files.write(path, _text(named))
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {files.reason(error)}") from error
 
@@ -170,9 +177,12 @@ def load(path: Path) -> PolicyFile:
     data: Any = yamlfile.read(path)
     if isinstance(data, dict) and "digest" not in data:
         raise ConfigError(f"{path.name}: digest: is missing ({_BY_HAND})")
+    digest = _digest(data) if isinstance(data, dict) else NONE
+    if isinstance(data, dict):
+        references.resolve(data, path.parent)
     policy = yamlfile.validate(PolicyFile, data, path.name)
     if policy.digest != NONE:
-        _check_marks(policy, _digest(data), path.name)
+        _check_marks(policy, digest, path.name)
     for i, task in enumerate(policy.tasks):
         check_overrides(task.overrides, f"{path.name}: tasks.{i}")
     return policy

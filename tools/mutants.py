@@ -1,0 +1,385 @@
+"""Put small faults into the product, one at a time, and ask the quick tests of that place whether they notice.
+
+Run by `make mutants`; writes its table of docs/RELIABILITY.md. `--scale 0.02` tries a fiftieth of them, and writes
+nothing. Each fault is put into a copy of the tree and built by the project's own makefiles, so that what is tested is
+what is built. A fault that does not compile, or that gives the same program, is none. Those that were looked at and
+change nothing that anybody could see stand in tools/mutants_equal.txt, each with its reason.
+"""
+
+import argparse
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import cmaes  # noqa: F401 - loaded once for all children
+import hypothesis  # noqa: F401
+import matplotlib.pyplot  # noqa: F401
+import numpy as np  # noqa: F401
+import pydantic  # noqa: F401
+import pytest
+import scipy.stats  # noqa: F401
+import sklearn.svm  # noqa: F401
+import yaml  # noqa: F401
+from mutant_rules import Mutant, is_other_program, mutants
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "RELIABILITY.md"
+EQUAL = ROOT / "tools" / "mutants_equal.txt"
+BEGIN, END = "<!-- measured by tools/mutants.py: begin -->\n", "<!-- measured by tools/mutants.py: end -->\n"
+TREE = ROOT / "build" / "mutants"
+FLAVOUR = "O0"
+"""Compiled and linked soonest."""
+TIME_S = 180.0
+"""A test that takes longer has noticed: its program no longer ends."""
+FOUND, SURVIVED, EQUIVALENT, NONE = "found", "survived", "equivalent", "none"
+QUIET = ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
+"""What is loaded before is not rewritten, and need not be."""
+NATIVE = ["make", "--no-print-directory", "-f", "tools/native.mk", f"FLAVOUR={FLAVOUR}", "WARNINGS=-w"]
+APP = ["make", "--no-print-directory", "-f", "tools/app.mk", "CC=gcc -w"]
+
+
+@dataclass(frozen=True)
+class Area:
+    """A part of the product, how many faults it gets, and the tests that are asked.
+
+    Attributes:
+        name: For the table.
+        sources: Patterns of paths, from the root.
+        number: Faults of a full run.
+        least: Share that must be found.
+        tests: C test programs by pattern, or files of pytest.
+        but: Sources that another area has.
+    """
+
+    name: str
+    sources: tuple[str, ...]
+    number: int
+    least: float
+    tests: tuple[str, ...]
+    but: tuple[str, ...] = ()
+
+
+LEARNER_TESTS = ("learners", "ephe", "ephe_memory", "cma_learner", "gp", "bo", "learners_bo_search", "belief")
+AREAS = (
+    Area("firmware core", ("firmware/core/ivl_*.c",), 130, 0.97, ("test_ivl_*",), ("ivl_guard.c", "ivl_wire.c")),
+    Area("guard", ("firmware/core/ivl_guard.c",), 50, 0.97, ("test_ivl_*",)),
+    Area("app", ("firmware/app/app_*.c",), 60, 0.97, ("test_app", "test_cf_*"), ("app_port.c",)),
+    Area("wire", ("firmware/core/ivl_wire.c", "sim_sil/sil_wire.c"), 30, 0.97, ("test_ivl_wire", "test_ivl_parts")),
+    Area("crtp", ("sim_sil/crtp/crtp_*.c",), 60, 0.92, ("test_crtp_*",), ("crtp_main.c", "crtp_udp.c")),
+    Area(
+        "learners", ("host/ivl/learners/*.py",), 50, 0.92, tuple(f"tests/py/test_{name}.py" for name in LEARNER_TESTS)
+    ),
+    Area(
+        "mocap",
+        ("host/ivl/mocap/watch.py", "host/ivl/mocap/guard.py"),
+        40,
+        0.92,
+        ("tests/wire/test_mocap_watch.py",),
+    ),
+    Area("store", ("host/ivl/store.py",), 30, 0.92, ("tests/py/test_store.py", "tests/py/test_borders.py")),
+)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a fault."""
+
+    mutant: Mutant
+    ending: str
+    by: str = ""
+
+
+# ---- what is tried
+
+
+def sources(area: Area) -> list[str]:
+    """The sources of an area, from the root, in order."""
+    paths = sorted({p for pattern in area.sources for p in ROOT.glob(pattern)})
+    return [str(p.relative_to(ROOT)) for p in paths if p.name not in area.but]
+
+
+def candidates(area: Area, seed: int) -> list[Mutant]:
+    """All faults of an area in an order that the seed decides."""
+    found = [m for path in sources(area) for m in mutants(path, (ROOT / path).read_text(encoding="utf-8"))]
+    random.Random(f"{seed} {area.name}").shuffle(found)
+    return found
+
+
+def read_equal() -> dict[tuple[str, str, str], str]:
+    """Faults that change nothing, with their reasons; SystemExit for a line that fits no source any more."""
+    known = {}
+    for number, line in enumerate(EQUAL.read_text(encoding="utf-8").splitlines(), 1):
+        if line and not line.startswith("#"):
+            fields = line.split(" ~~ ")
+            if len(fields) != 4:
+                raise SystemExit(f"{EQUAL.name}:{number}: path ~~ line ~~ changed line ~~ reason")
+            path, before, after, reason = fields
+            if before not in [text.strip() for text in (ROOT / path).read_text(encoding="utf-8").splitlines()]:
+                raise SystemExit(f"{EQUAL.name}:{number}: {path} has no such line")
+            known[path, before, after] = reason
+    return known
+
+
+# ---- running
+
+
+def run(command: list[str], folder: Path) -> int:
+    """Exit code of a command; -1 if it does not end, and then it and its children are ended."""
+    with subprocess.Popen(
+        command,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as process:
+        try:
+            return process.wait(TIME_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            return -1
+
+
+def run_pytest(test: str) -> int:
+    """Exit code of pytest on a file of the copy, -1 if it does not end.
+
+    A child of this process has what takes long to load already, but nothing of the package that has the fault.
+    """
+    child = os.fork()
+    if child == 0:
+        code = 99
+        try:
+            os.setsid()
+            quiet = os.open(os.devnull, os.O_RDWR)
+            for fd in (0, 1, 2):
+                os.dup2(quiet, fd)
+            os.chdir(TREE)
+            os.environ["PYTHONPATH"] = str(TREE / "host")
+            os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(TREE / "found")
+            sys.path.insert(0, str(TREE / "host"))
+            code = int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "--tb=no", *QUIET, test]))
+        finally:
+            os._exit(code)
+    ends_s = time.monotonic() + TIME_S
+    while time.monotonic() < ends_s:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(0.02)
+    os.killpg(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return -1
+
+
+def copy_tree() -> None:
+    """The tree as it is; what was compiled in the copy before is kept, and makefiles compile what has changed since."""
+    for name in ("firmware", "sim_sil", "tests", "tools", "host", "build/unity"):
+        wanted = {p.relative_to(ROOT) for p in (ROOT / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        there = {p.relative_to(TREE) for p in (TREE / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        for path in there - wanted:
+            (TREE / path).unlink()
+        for path in wanted:
+            if path not in there or (TREE / path).read_bytes() != (ROOT / path).read_bytes():
+                (TREE / path).parent.mkdir(parents=True, exist_ok=True)
+                # as new, so that it is compiled: the fault of a run that was ended may be in its object
+                shutil.copy(ROOT / path, TREE / path)
+    for name in (FLAVOUR, "app"):
+        if (ROOT / "build" / name).is_dir() and not (TREE / "build" / name).exists():
+            shutil.copytree(ROOT / "build" / name, TREE / "build" / name, symlinks=True)
+    for name in ("pyproject.toml", "Makefile", "docs", "CHANGELOG.md", "README.md"):
+        if not (TREE / name).is_symlink():
+            (TREE / name).symlink_to(ROOT / name)
+
+
+def programs(area: Area, path: str) -> list[str]:
+    """C test programs of an area, the one of the source's own name first."""
+    stem = Path(path).stem
+    found = sorted(
+        {
+            p.stem
+            for pattern in area.tests
+            for p in [*ROOT.glob(f"tests/c/{pattern}.c"), *ROOT.glob(f"tests/app/{pattern}.c")]
+        },
+        key=lambda name: (not name.endswith(stem), name != "test_app", name == "test_ivl_fuzz", name),
+    )
+    if not found:
+        raise SystemExit(f"mutants: no test fits {area.tests}")
+    return found
+
+
+def build_of(program: str) -> list[str]:
+    """The command that builds and runs one test program."""
+    return [*APP, "check"] if program == "test_app" else [*NATIVE, f"run-{program}"]
+
+
+def try_c(area: Area, mutant: Mutant) -> Verdict:
+    """Compile a fault, and run tests until one fails."""
+    if not is_other_code(mutant):
+        return Verdict(mutant, NONE)
+    for program in programs(area, mutant.path):
+        if run(build_of(program), TREE) != 0:
+            return Verdict(mutant, FOUND, program)
+    return Verdict(mutant, SURVIVED)
+
+
+def is_other_code(mutant: Mutant) -> bool:
+    """Whether a fault compiles, and the compiler makes something else of it."""
+    code = [assembly(TREE / mutant.path, mutant.path), assembly(ROOT / mutant.path, mutant.path)]
+    return code[0] is not None and code[0] != code[1]
+
+
+def assembly(path: Path, place: str) -> bytes | None:
+    """Optimised code of a source in the copy of the tree; None if it does not compile."""
+    folders = (
+        "firmware/core",
+        "firmware/app",
+        "sim_sil",
+        "sim_sil/physics",
+        "sim_sil/world",
+        "sim_sil/cf",
+        "sim_sil/crtp",
+    )
+    sdk = "sim_sil/cf/sdk" if place.startswith("firmware/app") and not place.endswith("app_cpx.c") else "firmware/sdk"
+    command = [
+        "gcc",
+        "-w",
+        "-std=gnu11",
+        "-O2",
+        "-ffp-contract=off",
+        "-DSDK_ON_HOST",
+        "-isystem",
+        sdk,
+        "-isystem",
+        "firmware/sdk",
+    ]
+    command += [part for folder in folders for part in ("-I", folder)] + ["-S", "-x", "c", "-o", "-", "-"]
+    source = path.read_bytes()
+    done = subprocess.run(command, input=source, cwd=TREE, capture_output=True, check=False)
+    return done.stdout if done.returncode == 0 else None
+
+
+def try_python(area: Area, mutant: Mutant, source: str) -> Verdict:
+    """Run tests on a fault until one fails, those that name the module first."""
+    if not is_other_program(source, mutant.text):
+        return Verdict(mutant, NONE)
+    stem = Path(mutant.path).stem
+    tests = sorted(area.tests, key=lambda name: (stem.split("_")[0] not in name, area.tests.index(name)))
+    for test in tests:
+        if run_pytest(test) != 0:
+            return Verdict(mutant, FOUND, Path(test).stem)
+    return Verdict(mutant, SURVIVED)
+
+
+def try_one(area: Area, mutant: Mutant) -> Verdict:
+    """Put a fault into the copy, ask, and take it out again."""
+    path, original = TREE / mutant.path, ROOT / mutant.path
+    source = original.read_text(encoding="utf-8")
+    path.write_text(mutant.text, encoding="utf-8")
+    try:
+        return try_python(area, mutant, source) if path.suffix == ".py" else try_c(area, mutant)
+    finally:
+        shutil.copy(original, path)
+        # newer than the object that has the fault
+        os.utime(path)
+
+
+def try_area(area: Area, number: int, seed: int, equal: dict[tuple[str, str, str], str]) -> list[Verdict]:
+    """Verdicts of so many faults that are some."""
+    verdicts: list[Verdict] = []
+    for mutant in candidates(area, seed):
+        if len(verdicts) >= number:
+            break
+        began_s = time.monotonic()
+        verdict = try_one(area, mutant)
+        if verdict.ending == SURVIVED and (mutant.path, mutant.before, mutant.after) in equal:
+            verdict = Verdict(mutant, EQUIVALENT)
+        if verdict.ending != NONE:
+            verdicts.append(verdict)
+            took_s = time.monotonic() - began_s
+            ended = f"{verdict.ending} {verdict.by}".strip()
+            print(f"{area.name} {len(verdicts)}/{number} {ended}, {took_s:.0f} s: {mutant}", flush=True)
+    return verdicts
+
+
+def check_untouched(areas: list[Area]) -> None:
+    """Without a fault every test must pass, or nothing is said by one that fails."""
+    for area in areas:
+        first = sources(area)[0]
+        if first.endswith(".c"):
+            commands = [build_of(program) for program in programs(area, first)]
+            bad = [command[-1] for command in commands if run(command, TREE) != 0]
+        else:
+            bad = [test for test in area.tests if run_pytest(test) != 0]
+        if bad:
+            raise SystemExit(f"mutants: without a fault these fail already: {', '.join(bad)}")
+
+
+# ---- telling
+
+
+def share(verdicts: list[Verdict]) -> float:
+    """How many of the faults that change something were found."""
+    counts = Counter(v.ending for v in verdicts)
+    return counts[FOUND] / max(counts[FOUND] + counts[SURVIVED], 1)
+
+
+def table(results: dict[str, list[Verdict]], seed: int) -> str:
+    """The results for the page."""
+    lines = [
+        f"`make mutants`, seed {seed}; {time.strftime('%Y-%m-%d')}.",
+        "",
+        "| where | faults | found | change nothing | not found | found, of those that change something |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, verdicts in results.items():
+        n = Counter(v.ending for v in verdicts)
+        counts = f"{len(verdicts)} | {n[FOUND]} | {n[EQUIVALENT]} | {n[SURVIVED]}"
+        lines.append(f"| {name} | {counts} | {100 * share(verdicts):.1f} % |")
+    return "\n".join(lines) + "\n"
+
+
+def write_page(text: str) -> None:
+    """Put the table between its marks."""
+    page = PAGE.read_text(encoding="utf-8")
+    before, _, rest = page.partition(BEGIN)
+    _, found, after = rest.partition(END)
+    if not found:
+        raise SystemExit(f"{PAGE}: the marks of the table are missing")
+    PAGE.write_text(f"{before}{BEGIN}{text}{END}{after}", encoding="utf-8")
+
+
+def main() -> int:
+    """Try the faults; exit code 1 if too many were not found."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--scale", type=float, default=1.0, help="share of the faults")
+    parser.add_argument("--only", action="append", choices=[area.name for area in AREAS], help="this area alone")
+    arguments = parser.parse_args()
+    areas = [area for area in AREAS if not arguments.only or area.name in arguments.only]
+    equal = read_equal()
+    copy_tree()
+    check_untouched(areas)
+    results = {}
+    for area in areas:
+        number = max(round(area.number * arguments.scale), 1)
+        results[area.name] = try_area(area, number, arguments.seed, equal)
+    text = table(results, arguments.seed)
+    print(text)
+    for verdict in (v for verdicts in results.values() for v in verdicts if v.ending == SURVIVED):
+        print(f"not found: {verdict.mutant}")
+    if arguments.scale == 1.0 and arguments.only is None:
+        write_page(text)
+    # a sample has too few faults for a share of them: there each must be found
+    is_sample = arguments.scale < 1.0
+    return 0 if all(share(results[area.name]) >= (1.0 if is_sample else area.least) for area in areas) else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
