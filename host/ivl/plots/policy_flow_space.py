@@ -34,7 +34,7 @@ def draw(found: Survey, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pat
     figure = style.new_figure(8.2, 4.6)
     space, place = spaces.space_and_planes(figure, 0.56)
     place.remove()
-    good = found.landable()[:, [1, 0, 2]]
+    good = found.best.landable()[:, [1, 0, 2]]
     limits = _limits(good, surface(found.general, found.theta))
     mesh = _inside(surface(found.general, found.theta), limits)
     space.plot_surface(*np.moveaxis(mesh, -1, 0), color=style.GREEN, alpha=0.35, linewidth=0, shade=False)
