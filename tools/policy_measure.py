@@ -62,10 +62,15 @@ SENSORS = {
     "camera50_delay20": ("sensing=camera50_delay20", "estimator=kalman"),
 }
 CELLS = MapSettings(
-    n_speeds=8, n_angles=8, tau_s=[0.12, 0.4], n_thresholds=50, moments_norm=[0.7, 0.8, 0.9, 1.0]
+    n_speeds=12, n_angles=12, tau_s=[0.12, 0.4], n_thresholds=50, moments_norm=[0.7, 0.8, 0.9, 1.0]
 )  # fmt: skip
-"""Cells of the box, thresholds and moments, where the best of each cell is looked for."""
-EFFORT, NOISY = Effort(), Effort(n_coarse=4, n_finalists=8, n_choose=40)
+"""Cells of the box, thresholds and moments, where the best of each cell is looked for.
+
+Where landings lie on a narrow ridge one (RREV_c, M_yd) does not serve a large cell: the smaller the cells, the better
+the best of each.
+"""
+EFFORT = Effort(n_coarse=2, n_finalists=8, n_choose=16)
+NOISY = Effort(n_coarse=4, n_finalists=10, n_choose=40)
 """More flights where equal approaches of equal policies end differently."""
 GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
 HARD = ("wide_long",)

@@ -102,7 +102,7 @@ def test_a_policy_beside_the_best_of_each_cell_is_on_the_same_flights(tmp_path: 
     found = policy_measure.beside_cells(Bench(tmp_path, lambda _: None), policies.by_hand(), Effort(n_choose=8))
     assert found["box"]["flights"] == found["best"]["flights"] == 150
     assert found["box"]["landed"] > 0.9
-    assert 0.5 < found["best"]["clean"] <= found["best"]["landed"]
+    assert 0.1 < found["best"]["clean"] <= found["best"]["landed"] < found["box"]["landed"]  # cells far too large
     ratio = found["ratio"]["landed"]
     assert ratio["value"] == pytest.approx(found["box"]["landed"] / found["best"]["landed"])
     assert ratio["interval"][0] <= ratio["value"] <= ratio["interval"][1]
