@@ -7,7 +7,7 @@ and settings that the data name, and are kept in a folder, so that a part that i
 import hashlib
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,9 @@ from ivl.analysis.intervals import share_of, student95, worst_tenth
 from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import assess, file, general, learn
 from ivl.policy.assess import Assessment
-from ivl.policy.cells import Effort, best_of_cells
+from ivl.policy.cells import Cells, Effort, best_of_cells
 from ivl.policy.file import PolicyFile
-from ivl.policy.flying import Drawn, Place, fly, fly_own
+from ivl.policy.flying import Drawn, Place, PolicyTask, fly, fly_own
 from ivl.policy.flying import score as score_of
 from ivl.policy.general import MapSettings
 from ivl.policy.region import BOX, PLANE, Approaches, Series
@@ -83,9 +83,9 @@ FAMILY_ON = (
     "go.n_held_out=100",
 )  # fmt: skip
 """The search on from the policy of the nominal vehicle, with it or with drawn ones."""
-N_FAMILY, N_DRAWN, N_EACH = 24, 40, 100
+N_FAMILY, N_DRAWN, N_EACH, N_BOUND = 24, 40, 100, 20
 FEW_CELLS = MapSettings(n_speeds=4, n_angles=4, tau_s=[0.12, 0.4], n_thresholds=28, moments_norm=[0.8, 0.95])
-OF_EACH, OF_ALL = Effort(n_coarse=4, n_finalists=5, n_choose=24), Effort(n_coarse=1, n_finalists=8, n_choose=6)
+OF_EACH, OF_ALL = Effort(n_coarse=3, n_finalists=5, n_choose=16), Effort(n_coarse=1, n_finalists=8, n_choose=6)
 """For cells of many vehicles; what serves all of them is a mean over all of them, and needs fewer flights of each."""
 N_ONE_CLASS = 1000
 Data = dict[str, Any]
@@ -113,6 +113,14 @@ class Bench:
                 raise KeyboardInterrupt
             file.save(found, path)
         return file.load(path)
+
+    def kept(self, what: Data, measure: Callable[[], Any]) -> Any:
+        """Plain data of a measurement, which `what` describes in full; with one simulator it is made once."""
+        text = json.dumps([what, native.library().digest()], sort_keys=True)
+        path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"
+        if not path.exists():
+            path.write_text(json.dumps(measure()), encoding="utf-8")
+        return json.loads(path.read_text(encoding="utf-8"))
 
     def judged(self, policy: PolicyFile) -> Assessment:
         """On what it was learned on."""
@@ -159,19 +167,39 @@ def clearance_m(bench: Bench, policy: PolicyFile) -> float:
 
 def beside_cells(bench: Bench, policy: PolicyFile, effort: Effort) -> Data:
     """A policy over the box beside the best (RREV_c, M_yd) of each cell, on the same fresh approaches."""
-    task = policy.tasks[0]
-    place = Place.of(task)
-    bench.say(f"the best of each cell: {task.vehicle}, {task.gear}, {task.sensing or 'own sensors'}")
-    best = best_of_cells(CELLS, BOX, SEED, [place], effort, bench.threads)
+    place = Place.of(policy.tasks[0])
+    best = best_of_box(bench, policy.tasks[0], effort)
     approaches = assess.fresh(BOX, N_APPROACHES, SEED)
+    theta = np.array(best["theta"])[
+        Cells.of(BOX, CELLS.n_speeds, CELLS.n_angles).number_of(approaches.speed_mps, approaches.angle_deg)
+    ]
     (own,) = fly([place], policy.form, General(policy.form).always_go(policy.values), approaches, bench.threads)
-    (by_cell,) = fly_own([place], policy_forms.PAPER, best.of(approaches), approaches, bench.threads)
+    (by_cell,) = fly_own([place], policy_forms.PAPER, theta, approaches, bench.threads)
     return {
         "box": rates(own),
-        "best": {**rates(by_cell), "cells": len(best.theta), "search": best.n_flights},
-        "ratio": {"landed": ratio(four_leg(own), four_leg(by_cell)), "clean": ratio(clean(own), clean(by_cell)),
-                  "score": ratio(score_of(own), score_of(by_cell))},
+        "best": {**rates(by_cell), "cells": len(best["theta"]), "search": best["flights"]},
+        "ratio": {
+            "landed": ratio(four_leg(own), four_leg(by_cell)),
+            "clean": ratio(clean(own), clean(by_cell)),
+            "score": ratio(score_of(own), score_of(by_cell)),
+        },
+    }
+
+
+def best_of_box(bench: Bench, task: PolicyTask, effort: Effort) -> Data:
+    """Threshold and moment of each of `CELLS`, and the flights that found them."""
+
+    def measure() -> Data:
+        bench.say(f"the best of each cell: {task.vehicle}, {task.gear}, {task.sensing or 'own sensors'}")
+        best = best_of_cells(CELLS, BOX, SEED, [Place.of(task)], effort, bench.threads)
+        return {"theta": best.theta.tolist(), "flights": best.n_flights}
+
+    what = {
+        "best": task.model_dump(mode="json"), "cells": CELLS.model_dump(mode="json"), "effort": asdict(effort),
+        "seed": SEED,
     }  # fmt: skip
+    found: Data = bench.kept(what, measure)
+    return found
 
 
 def ratio(values: npt.ArrayLike, others: npt.ArrayLike) -> Data:
@@ -259,34 +287,33 @@ def _constant(bench: Bench, chosen: general.GeneralExperiment) -> Data:
 
 def family(bench: Bench) -> Data:
     """A policy of the nominal vehicle beside one of drawn vehicles, searched on from the same start."""
-    found: Data = {}
-    for gear in ("wide_long",):
-        begin = bench.learned(*nominal(gear))
-        over_drawn = (f"drawn.n_vehicles={N_FAMILY}", "drawn.seed=1")
-        policies = {
-            "nominal": bench.learned(*FAMILY_ON, *FLOWN, f"gear={gear}", *_shared_by(1), start=begin),
-            "family": bench.learned(
-                *FAMILY_ON, *FLOWN, f"gear={gear}", *over_drawn, *_shared_by(N_FAMILY), start=begin
-            ),
+    return {f"crazyflie21, table1, {gear}": _family(bench, gear) for gear in ("wide_long",)}
+
+
+def _family(bench: Bench, gear: str) -> Data:
+    policies = {name: searched_on(bench, gear, name == "family") for name in ("nominal", "family")}
+    task = policies["nominal"].tasks[0]
+    places, batches = drawn_anew(task, N_DRAWN)
+    row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY, **best_of_vehicles(bench, task)}
+    flights: dict[str, list[Outcomes]] = {}
+    for name, policy in policies.items():
+        bench.say(f"{N_DRAWN} vehicles, {gear}: {name}")
+        theta = General(policy.form).always_go(policy.values)
+        flights[name] = fly(places, policy.form, theta, batches, bench.threads)
+        row[name] = {
+            **about(policy), **of_vehicles(flights[name]), "nominal_box": over(bench, policy, "box")["box"],
+            "of_bound": of_vehicles(flights[name][:N_BOUND]),
         }  # fmt: skip
-        drawn = Drawn(n_vehicles=N_DRAWN, seed=SEED)
-        places = Place.of(begin.tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
-        batches = Series([BOX], SEED, Purpose.ASSESS).for_each(len(places), N_EACH)
-        row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY}
-        flights: dict[str, list[Outcomes]] = {}
-        for name, policy in policies.items():
-            bench.say(f"{N_DRAWN} vehicles, {gear}: {name}")
-            theta = General(policy.form).always_go(policy.values)
-            flights[name] = fly(places, policy.form, theta, batches, bench.threads)
-            row[name] = {
-                **about(policy), **of_vehicles(flights[name]), "nominal_box": over(bench, policy, "box")["box"],
-            }  # fmt: skip
-        row |= _best_of_vehicles(bench, places, batches)
-        gain = landed_of(flights["family"]) - landed_of(flights["nominal"])
-        half = float(student95(gain.size - 1) * gain.std(ddof=1) / np.sqrt(gain.size))
-        row["gain"] = {"landed": float(gain.mean()), "half": half, "better": int((gain > 0).sum())}
-        found[f"crazyflie21, table1, {gear}"] = row
-    return found
+    gain = landed_of(flights["family"]) - landed_of(flights["nominal"])
+    half = float(student95(gain.size - 1) * gain.std(ddof=1) / np.sqrt(gain.size))
+    row["gain"] = {"landed": float(gain.mean()), "half": half, "better": int((gain > 0).sum())}
+    return row
+
+
+def drawn_anew(task: PolicyTask, n: int) -> tuple[list[Place], list[Approaches]]:
+    """Vehicles that judge, the first n of always the same, and approaches of each."""
+    places = Place.of(task).members(Drawn(n_vehicles=n, seed=SEED), Purpose.FAMILY_ASSESS)
+    return places, Series([BOX], SEED, Purpose.ASSESS).for_each(n, N_EACH)
 
 
 def landed_of(flown: Sequence[Outcomes]) -> FloatArray:
@@ -304,22 +331,39 @@ def of_vehicles(flown: Sequence[Outcomes]) -> Data:
     }
 
 
-def _best_of_vehicles(bench: Bench, places: Sequence[Place], batches: Sequence[Approaches]) -> Data:
+def best_of_vehicles(bench: Bench, task: PolicyTask) -> Data:
     """What limits a family: the best of each cell, one for all vehicles, and one for each.
 
     Both are chosen on the vehicles that judge them, on other approaches.
     """
-    bench.say(f"{len(places)} vehicles: the best of each cell")
-    own = [best_of_cells(FEW_CELLS, BOX, SEED, [place], OF_EACH, bench.threads) for place in places]
-    shared = best_of_cells(FEW_CELLS, BOX, SEED, places, OF_ALL, bench.threads)
-    found: Data = {}
-    for name, bests in (("best_for_each", own), ("best_for_all", [shared] * len(places))):
-        flown = [
-            fly_own([place], policy_forms.PAPER, best.of(batch), batch, bench.threads)[0]
-            for place, best, batch in zip(places, bests, batches, strict=True)
-        ]
-        found[name] = {**of_vehicles(flown), "cells": len(shared.theta), "vehicles": len(places)}
+
+    def measure() -> Data:
+        bench.say(f"{N_BOUND} vehicles: the best of each cell")
+        places, batches = drawn_anew(task, N_BOUND)
+        own = [best_of_cells(FEW_CELLS, BOX, SEED, [place], OF_EACH, bench.threads) for place in places]
+        shared = best_of_cells(FEW_CELLS, BOX, SEED, places, OF_ALL, bench.threads)
+        found: Data = {}
+        for name, bests in (("best_for_each", own), ("best_for_all", [shared] * len(places))):
+            flown = [
+                fly_own([place], policy_forms.PAPER, best.of(batch), batch, bench.threads)[0]
+                for place, best, batch in zip(places, bests, batches, strict=True)
+            ]
+            found[name] = {**of_vehicles(flown), "cells": len(shared.theta), "vehicles": len(places)}
+        return found
+
+    what = {
+        "best of vehicles": task.model_dump(mode="json"), "n": [N_BOUND, N_EACH], "seed": SEED,
+        "cells": FEW_CELLS.model_dump(mode="json"), "effort": [asdict(OF_EACH), asdict(OF_ALL)],
+    }  # fmt: skip
+    found: Data = bench.kept(what, measure)
     return found
+
+
+def searched_on(bench: Bench, gear: str, over_drawn: bool) -> PolicyFile:
+    """The search on from the policy of the vehicle of the files, on it or on drawn vehicles."""
+    drawn = (f"drawn.n_vehicles={N_FAMILY}", "drawn.seed=1") if over_drawn else ()
+    shared = _shared_by(N_FAMILY if over_drawn else 1)
+    return bench.learned(*FAMILY_ON, *FLOWN, f"gear={gear}", *drawn, *shared, start=bench.learned(*nominal(gear)))
 
 
 def _shared_by(n_vehicles: int) -> tuple[str, str]:
