@@ -166,14 +166,18 @@ def _family(found: Data) -> list[str]:
             ("best_for_each", "best of each cell, for each vehicle its own"),
         ):
             rows.append((name, title, _pair(row[which]), _rate(row[which]["worst_tenth"]), "-"))
-        gain = row["gain"]
+        gain, bound = row["gain"], row["best_for_all"]
+        part = row["nominal"]["of_bound"]["landed"] / bound["landed"]
         low, high = gain["landed"] - gain["half"], gain["landed"] + gain["half"]
         what = "gains" if low > 0 else "loses" if high < 0 else "makes no difference that these vehicles show:"
         gains.append(
             _paragraph(
                 f"{name}: learning over the family {what} {gain['landed']:+.3f}",
                 f"({low:+.3f} to {high:+.3f}) in landings;",
-                f"it is better on {gain['better']} of {row['vehicles']} vehicles.",
+                f"it is better on {gain['better']} of {row['vehicles']} vehicles. On the {bound['vehicles']} vehicles",
+                f"of the best of each cell the two land {_rate(row['nominal']['of_bound']['landed'])} and",
+                f"{_rate(row['family']['of_bound']['landed'])}: the first is {_rate(part)} of what the best of each",
+                "cell lands that is the same for all of them.",
             )
         )
     first = next(iter(found.values()))
