@@ -73,7 +73,7 @@ EFFORT = Effort(n_coarse=2, n_finalists=8, n_choose=16)
 NOISY = Effort(n_coarse=4, n_finalists=10, n_choose=40)
 """More flights where equal approaches of equal policies end differently."""
 GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
-HARD = ("wide_long",)
+HARD = ("narrow_long", "wide_long")
 OTHER_FORMS = (("polynomial2", "wide_long"), ("bilinear", "wide_long"))
 FLOWN = ("vehicle=crazyflie21", "gear_set=table1")
 FLOWN_GEARS = ("wide_short", "wide_long")
