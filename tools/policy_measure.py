@@ -119,7 +119,9 @@ class Bench:
         text = json.dumps([what, native.library().digest()], sort_keys=True)
         path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"
         if not path.exists():
-            path.write_text(json.dumps(measure()), encoding="utf-8")
+            new = path.with_suffix(".new")
+            new.write_text(json.dumps(measure()), encoding="utf-8")
+            new.replace(path)
         return json.loads(path.read_text(encoding="utf-8"))
 
     def judged(self, policy: PolicyFile) -> Assessment:
