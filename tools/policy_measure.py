@@ -83,10 +83,7 @@ FAMILY_ON = (
     "go.n_held_out=100",
 )  # fmt: skip
 """The search on from the policy of the nominal vehicle, with it or with drawn ones."""
-N_FAMILY, N_DRAWN, N_EACH, N_BOUND = 24, 40, 100, 20
-FEW_CELLS = MapSettings(n_speeds=4, n_angles=4, tau_s=[0.12, 0.4], n_thresholds=28, moments_norm=[0.8, 0.95])
-OF_EACH, OF_ALL = Effort(n_coarse=3, n_finalists=5, n_choose=16), Effort(n_coarse=1, n_finalists=8, n_choose=6)
-"""For cells of many vehicles; what serves all of them is a mean over all of them, and needs fewer flights of each."""
+N_FAMILY, N_DRAWN, N_EACH = 24, 40, 100
 N_ONE_CLASS = 1000
 Data = dict[str, Any]
 FloatArray = npt.NDArray[np.float64]
@@ -169,23 +166,31 @@ def clearance_m(bench: Bench, policy: PolicyFile) -> float:
 
 def beside_cells(bench: Bench, policy: PolicyFile, effort: Effort) -> Data:
     """A policy over the box beside the best (RREV_c, M_yd) of each cell, on the same fresh approaches."""
-    place = Place.of(policy.tasks[0])
-    best = best_of_box(bench, policy.tasks[0], effort)
-    approaches = assess.fresh(BOX, N_APPROACHES, SEED)
-    theta = np.array(best["theta"])[
-        Cells.of(BOX, CELLS.n_speeds, CELLS.n_angles).number_of(approaches.speed_mps, approaches.angle_deg)
-    ]
-    (own,) = fly([place], policy.form, General(policy.form).always_go(policy.values), approaches, bench.threads)
-    (by_cell,) = fly_own([place], policy_forms.PAPER, theta, approaches, bench.threads)
-    return {
-        "box": rates(own),
-        "best": {**rates(by_cell), "cells": len(best["theta"]), "search": best["flights"]},
-        "ratio": {
-            "landed": ratio(four_leg(own), four_leg(by_cell)),
-            "clean": ratio(clean(own), clean(by_cell)),
-            "score": ratio(score_of(own), score_of(by_cell)),
-        },
-    }
+    task = policy.tasks[0]
+    best = best_of_box(bench, task, effort)
+
+    def measure() -> Data:
+        place, approaches = Place.of(task), assess.fresh(BOX, N_APPROACHES, SEED)
+        cells = Cells.of(BOX, CELLS.n_speeds, CELLS.n_angles)
+        theta = np.array(best["theta"])[cells.number_of(approaches.speed_mps, approaches.angle_deg)]
+        (own,) = fly([place], policy.form, General(policy.form).always_go(policy.values), approaches, bench.threads)
+        (by_cell,) = fly_own([place], policy_forms.PAPER, theta, approaches, bench.threads)
+        return {
+            "box": rates(own),
+            "best": {**rates(by_cell), "cells": len(best["theta"]), "search": best["flights"]},
+            "ratio": {
+                "landed": ratio(four_leg(own), four_leg(by_cell)),
+                "clean": ratio(clean(own), clean(by_cell)),
+                "score": ratio(score_of(own), score_of(by_cell)),
+            },
+        }
+
+    what = {
+        "beside": policy.values, "form": policy.form, "task": task.model_dump(mode="json"), "best": best, "seed": SEED,
+        "n": N_APPROACHES,
+    }  # fmt: skip
+    found: Data = bench.kept(what, measure)
+    return found
 
 
 def best_of_box(bench: Bench, task: PolicyTask, effort: Effort) -> Data:
@@ -294,9 +299,9 @@ def family(bench: Bench) -> Data:
 
 def _family(bench: Bench, gear: str) -> Data:
     policies = {name: searched_on(bench, gear, name == "family") for name in ("nominal", "family")}
-    task = policies["nominal"].tasks[0]
-    places, batches = drawn_anew(task, N_DRAWN)
-    row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY, **best_of_vehicles(bench, task)}
+    places = Place.of(policies["nominal"].tasks[0]).members(Drawn(n_vehicles=N_DRAWN, seed=SEED), Purpose.FAMILY_ASSESS)
+    batches = Series([BOX], SEED, Purpose.ASSESS).for_each(len(places), N_EACH)
+    row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY}
     flights: dict[str, list[Outcomes]] = {}
     for name, policy in policies.items():
         bench.say(f"{N_DRAWN} vehicles, {gear}: {name}")
@@ -304,18 +309,11 @@ def _family(bench: Bench, gear: str) -> Data:
         flights[name] = fly(places, policy.form, theta, batches, bench.threads)
         row[name] = {
             **about(policy), **of_vehicles(flights[name]), "nominal_box": over(bench, policy, "box")["box"],
-            "of_bound": of_vehicles(flights[name][:N_BOUND]),
         }  # fmt: skip
     gain = landed_of(flights["family"]) - landed_of(flights["nominal"])
     half = float(student95(gain.size - 1) * gain.std(ddof=1) / np.sqrt(gain.size))
     row["gain"] = {"landed": float(gain.mean()), "half": half, "better": int((gain > 0).sum())}
     return row
-
-
-def drawn_anew(task: PolicyTask, n: int) -> tuple[list[Place], list[Approaches]]:
-    """Vehicles that judge, the first n of always the same, and approaches of each."""
-    places = Place.of(task).members(Drawn(n_vehicles=n, seed=SEED), Purpose.FAMILY_ASSESS)
-    return places, Series([BOX], SEED, Purpose.ASSESS).for_each(n, N_EACH)
 
 
 def landed_of(flown: Sequence[Outcomes]) -> FloatArray:
@@ -331,34 +329,6 @@ def of_vehicles(flown: Sequence[Outcomes]) -> Data:
         "clean": float(np.mean([clean(outcomes).mean() for outcomes in flown])),
         "worst_tenth": worst_tenth(landed),
     }
-
-
-def best_of_vehicles(bench: Bench, task: PolicyTask) -> Data:
-    """What limits a family: the best of each cell, one for all vehicles, and one for each.
-
-    Both are chosen on the vehicles that judge them, on other approaches.
-    """
-
-    def measure() -> Data:
-        bench.say(f"{N_BOUND} vehicles: the best of each cell")
-        places, batches = drawn_anew(task, N_BOUND)
-        own = [best_of_cells(FEW_CELLS, BOX, SEED, [place], OF_EACH, bench.threads) for place in places]
-        shared = best_of_cells(FEW_CELLS, BOX, SEED, places, OF_ALL, bench.threads)
-        found: Data = {}
-        for name, bests in (("best_for_each", own), ("best_for_all", [shared] * len(places))):
-            flown = [
-                fly_own([place], policy_forms.PAPER, best.of(batch), batch, bench.threads)[0]
-                for place, best, batch in zip(places, bests, batches, strict=True)
-            ]
-            found[name] = {**of_vehicles(flown), "cells": len(shared.theta), "vehicles": len(places)}
-        return found
-
-    what = {
-        "best of vehicles": task.model_dump(mode="json"), "n": [N_BOUND, N_EACH], "seed": SEED,
-        "cells": FEW_CELLS.model_dump(mode="json"), "effort": [asdict(OF_EACH), asdict(OF_ALL)],
-    }  # fmt: skip
-    found: Data = bench.kept(what, measure)
-    return found
 
 
 def searched_on(bench: Bench, gear: str, over_drawn: bool) -> PolicyFile:

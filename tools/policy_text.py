@@ -161,23 +161,14 @@ def _family(found: Data) -> list[str]:
         for which, title in (("nominal", "the vehicle of the files"), ("family", drawn)):
             of = row[which]
             rows.append((name, title, _pair(of), _rate(of["worst_tenth"]), _pair(of["nominal_box"])))
-        for which, title in (
-            ("best_for_all", "best of each cell, the same for all vehicles"),
-            ("best_for_each", "best of each cell, for each vehicle its own"),
-        ):
-            rows.append((name, title, _pair(row[which]), _rate(row[which]["worst_tenth"]), "-"))
-        gain, bound = row["gain"], row["best_for_all"]
-        part = row["nominal"]["of_bound"]["landed"] / bound["landed"]
+        gain = row["gain"]
         low, high = gain["landed"] - gain["half"], gain["landed"] + gain["half"]
         what = "gains" if low > 0 else "loses" if high < 0 else "makes no difference that these vehicles show:"
         gains.append(
             _paragraph(
                 f"{name}: learning over the family {what} {gain['landed']:+.3f}",
                 f"({low:+.3f} to {high:+.3f}) in landings;",
-                f"it is better on {gain['better']} of {row['vehicles']} vehicles. On the {bound['vehicles']} vehicles",
-                f"of the best of each cell the two land {_rate(row['nominal']['of_bound']['landed'])} and",
-                f"{_rate(row['family']['of_bound']['landed'])}: the first is {_rate(part)} of what the best of each",
-                "cell lands that is the same for all of them.",
+                f"it is better on {gain['better']} of {row['vehicles']} vehicles.",
             )
         )
     first = next(iter(found.values()))
@@ -189,9 +180,7 @@ def _family(found: Data) -> list[str]:
             f"same number of flights: one on the vehicle of the files, one on {first['learned_over']} vehicles drawn",
             f"from them. Both are judged over the box on the same {first['vehicles']} vehicles drawn anew,",
             f"{first['flights']} approaches each, landed / clean. The flight core of a drawn vehicle knows the mass,",
-            "inertia and thrust of that vehicle. The best (RREV_c, M_yd) of each of",
-            f"{first['best_for_all']['cells']} cells tells what limits it: either the same for all of the",
-            f"{first['best_for_all']['vehicles']} judged vehicles on which it was chosen, or for each of them its own.",
+            "inertia and thrust of that vehicle.",
         ),
         table(("vehicle, gear", "learned on", "drawn vehicles", "worst tenth, landed", "vehicle of the files"), rows),
         *gains,

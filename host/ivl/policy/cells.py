@@ -55,7 +55,8 @@ class Cells:
     @staticmethod
     def of(region: Region, n_speeds: int, n_angles: int) -> "Cells":
         """So many along speed and angle."""
-        return Cells(np.linspace(*region.speeds_mps, n_speeds + 1), np.linspace(*region.angles_deg, n_angles + 1))
+        (v_lo, v_hi), (a_lo, a_hi) = region.speeds_mps, region.angles_deg
+        return Cells(np.linspace(v_lo, v_hi, n_speeds + 1), np.linspace(a_lo, a_hi, n_angles + 1))
 
     @property
     def shape(self) -> tuple[int, int]:
