@@ -6,8 +6,8 @@ and settings that the data name, and are kept in a folder, so that a part that i
 
 import hashlib
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +17,19 @@ import policy_oneclass
 
 from ivl import forms as policy_forms
 from ivl import native
-from ivl.analysis.intervals import share_of, student95
-from ivl.outcome import clean, four_leg
+from ivl.analysis.intervals import share_of, student95, worst_tenth
+from ivl.outcome import Outcomes, clean, four_leg
 from ivl.policy import assess, file, general, learn
 from ivl.policy.assess import Assessment
+from ivl.policy.cells import Cells, Effort, best_of_cells
 from ivl.policy.file import PolicyFile
 from ivl.policy.flying import Drawn, Place, PolicyTask, fly, fly_own
 from ivl.policy.flying import score as score_of
+from ivl.policy.general import MapSettings
 from ivl.policy.region import BOX, PLANE, Approaches, Series
 from ivl.policy.shape import General, is_general
-from ivl.policy.start import moment_most_Nmm, smooth
-from ivl.seeds import Purpose, derive
+from ivl.policy.start import moment_most_Nmm
+from ivl.seeds import Purpose
 
 EXPERIMENT = "experiments/general.yaml"
 SEED = 7
@@ -43,7 +45,9 @@ LONG = (
     "regions=[box]", "search.n_iterations=40", "search.n_approaches=100", "search.n_select=400", "go.n_approaches=100",
     "go.n_held_out=100",
 )  # fmt: skip
-"""Six times as many flights over the box, for what is hard to land."""
+"""Five times as many flights, over the box."""
+LONGER = (*LONG, "search.n_iterations=100", "search.n_select=1000")
+"""For what is hard to land."""
 ON = (
     "map.n_speeds=4", "map.n_angles=4", "map.n_thresholds=20", "map.moments_norm=[0.9]", "search.n_iterations=8",
     "search.n_approaches=50", "search.spread_per_s=0.15", "search.n_select=300", "go.n_approaches=100",
@@ -57,10 +61,22 @@ SENSORS = {
     "camera50": ("sensing=camera50", "estimator=kalman"),
     "camera50_delay20": ("sensing=camera50_delay20", "estimator=kalman"),
 }
+CELLS = MapSettings(
+    n_speeds=12, n_angles=12, tau_s=[0.12, 0.4], n_thresholds=50, moments_norm=[0.7, 0.8, 0.9, 1.0]
+)  # fmt: skip
+"""Cells of the box, thresholds and moments, where the best of each cell is looked for.
+
+Where landings lie on a narrow ridge one (RREV_c, M_yd) does not serve a large cell: the smaller the cells, the better
+the best of each.
+"""
+EFFORT = Effort(n_coarse=2, n_finalists=8, n_choose=16)
+NOISY = Effort(n_coarse=4, n_finalists=10, n_choose=40)
+"""More flights where equal approaches of equal policies end differently."""
 GEARS = ("extra_narrow_short", "narrow_short", "wide_short", "extra_narrow_long", "narrow_long", "wide_long")
-HARD = ("wide_long",)
+HARD = ("narrow_long", "wide_long")
 OTHER_FORMS = (("polynomial2", "wide_long"), ("bilinear", "wide_long"))
 FLOWN = ("vehicle=crazyflie21", "gear_set=table1")
+FLOWN_GEARS = ("wide_short", "wide_long")
 FORMS = ("polynomial2", "polynomial3", "bilinear")
 FAMILY_ON = (
     "regions=[box]", *ON[:4], "search.n_iterations=40", "search.spread_per_s=0.2", "go.n_approaches=100",
@@ -94,6 +110,16 @@ class Bench:
                 raise KeyboardInterrupt
             file.save(found, path)
         return file.load(path)
+
+    def kept(self, what: Data, measure: Callable[[], Any]) -> Any:
+        """Plain data of a measurement, which `what` describes in full; with one simulator it is made once."""
+        text = json.dumps([what, native.library().digest()], sort_keys=True)
+        path = self.folder / f"{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"
+        if not path.exists():
+            new = path.with_suffix(".new")
+            new.write_text(json.dumps(measure()), encoding="utf-8")
+            new.replace(path)
+        return json.loads(path.read_text(encoding="utf-8"))
 
     def judged(self, policy: PolicyFile) -> Assessment:
         """On what it was learned on."""
@@ -138,78 +164,57 @@ def clearance_m(bench: Bench, policy: PolicyFile) -> float:
     return float(np.min(flown["d_min_m"][(flown["no_go"] == 1) & ~np.isfinite(flown["t_impact_s"])]))
 
 
-@dataclass(frozen=True)
-class Cells:
-    """Middles of equal cells of the box, n approaches in each, with random numbers of their own."""
+def beside_cells(bench: Bench, policy: PolicyFile, effort: Effort) -> Data:
+    """A policy over the box beside the best (RREV_c, M_yd) of each cell, on the same fresh approaches."""
+    task = policy.tasks[0]
+    best = best_of_box(bench, task, effort)
 
-    n_axis: int = 6
-    n_coarse: int = 2
-    n_choose: int = 16
-    n_judge: int = 50
-    n_finalists: int = 5
+    def measure() -> Data:
+        place, approaches = Place.of(task), assess.fresh(BOX, N_APPROACHES, SEED)
+        cells = Cells.of(BOX, CELLS.n_speeds, CELLS.n_angles)
+        theta = np.array(best["theta"])[cells.number_of(approaches.speed_mps, approaches.angle_deg)]
+        (own,) = fly([place], policy.form, General(policy.form).always_go(policy.values), approaches, bench.threads)
+        (by_cell,) = fly_own([place], policy_forms.PAPER, theta, approaches, bench.threads)
+        return {
+            "box": rates(own),
+            "best": {**rates(by_cell), "cells": len(best["theta"]), "search": best["flights"]},
+            "ratio": {
+                "landed": ratio(four_leg(own), four_leg(by_cell)),
+                "clean": ratio(clean(own), clean(by_cell)),
+                "score": ratio(score_of(own), score_of(by_cell)),
+            },
+        }
 
-    def approaches(self, n: int, first: int, purpose: Purpose) -> Approaches:
-        """Shape (cells * n,), the n of a cell side by side."""
-        axes = []
-        for lo, hi in (BOX.speeds_mps, BOX.angles_deg):
-            edges = np.linspace(lo, hi, self.n_axis + 1)
-            axes.append(0.5 * (edges[1:] + edges[:-1]))
-        speed, angle = (np.repeat(axis.reshape(-1), n) for axis in np.meshgrid(*axes, indexing="ij"))
-        streams = np.arange(first, first + speed.size, dtype=np.uint64)
-        return Approaches(speed, angle, streams, derive(SEED, purpose))
-
-
-NOISY = Cells(n_coarse=6, n_choose=40, n_finalists=8)
-"""More flights for the choice, where equal approaches of equal policies end differently."""
-
-
-def ceiling(bench: Bench, task: PolicyTask, cells: Cells) -> tuple[FloatArray, Approaches]:
-    """Landed and clean of the best RREV_c and M_yd of each cell, judged on other random numbers than chose it.
-
-    The grid is smoothed over 5 ms of timing; the best few of a cell are flown again, and the best of them is judged.
-
-    Returns:
-        Shape (2,), and the approaches that judged.
-    """
-    bench.say(f"the best of each cell: {task.vehicle}, {task.gear}, {task.sensing or 'own sensors'}")
-    place, n_cells = Place.of(task), cells.n_axis**2
-    tau_s = np.linspace(0.12, 0.4, 36)
-    moments = moment_most_Nmm([place]) * np.array([0.75, 0.9, 1.0])
-    grid = np.stack(np.broadcast_arrays(1.0 / tau_s, moments[:, None]), axis=-1)  # (moments, thresholds, 2)
-    coarse = cells.approaches(cells.n_coarse, 0, Purpose.GRID)
-    (flown,) = fly([place], "constant", grid, coarse, bench.threads)
-    scores = score_of(flown).reshape(*grid.shape[:2], n_cells, cells.n_coarse).mean(axis=-1)
-    smoothed = smooth(scores, tau_s, 0.005).reshape(-1, n_cells)
-    finalists = np.argsort(-smoothed, axis=0)[: cells.n_finalists]  # (finalists, cells)
-    policies = grid.reshape(-1, 2)[finalists]
-    chosen = _fly_cells(place, policies, cells.approaches(cells.n_choose, 0, Purpose.SELECT), bench.threads)
-    best = score_of(chosen).mean(axis=-1).argmax(axis=0)
-    judge = cells.approaches(cells.n_judge, 0, Purpose.ASSESS)
-    final = _fly_cells(place, policies[best, np.arange(n_cells)][None], judge, bench.threads)
-    return np.array([four_leg(final).mean(), clean(final).mean()]), judge
+    what = {
+        "beside": policy.values, "form": policy.form, "task": task.model_dump(mode="json"), "best": best, "seed": SEED,
+        "n": N_APPROACHES,
+    }  # fmt: skip
+    found: Data = bench.kept(what, measure)
+    return found
 
 
-def _fly_cells(place: Place, policies: FloatArray, approaches: Approaches, threads: int | None) -> Any:
-    """Outcomes (policies, cells, n) of policies (policies, cells, 2) that belong to a cell each."""
-    n = len(approaches) // policies.shape[1]
-    (flown,) = fly_own([place], "constant", np.repeat(policies, n, axis=1), approaches, threads)
-    return flown.reshape(*policies.shape[:2], n)
+def best_of_box(bench: Bench, task: PolicyTask, effort: Effort) -> Data:
+    """Threshold and moment of each of `CELLS`, and the flights that found them."""
+
+    def measure() -> Data:
+        bench.say(f"the best of each cell: {task.vehicle}, {task.gear}, {task.sensing or 'own sensors'}")
+        best = best_of_cells(CELLS, BOX, SEED, [Place.of(task)], effort, bench.threads)
+        return {"theta": best.theta.tolist(), "flights": best.n_flights}
+
+    what = {
+        "best": task.model_dump(mode="json"), "cells": CELLS.model_dump(mode="json"), "effort": asdict(effort),
+        "seed": SEED,
+    }  # fmt: skip
+    found: Data = bench.kept(what, measure)
+    return found
 
 
-def beside_ceiling(bench: Bench, policy: PolicyFile, cells: Cells | None = None) -> Data:
-    """A policy over the box, and in cells beside the best of each cell on the same flights."""
-    used = cells or Cells()
-    place = Place.of(policy.tasks[0])
-    best, approaches = ceiling(bench, policy.tasks[0], used)
-    theta = General(policy.form).always_go(policy.values)
-    (flown,) = fly([place], policy.form, theta, approaches, bench.threads)
-    own = np.array([four_leg(flown).mean(), clean(flown).mean()])
-    return {
-        **over(bench, policy, "box"),
-        "cells": {"landed": own[0], "clean": own[1], "flights": len(approaches)},
-        "best": {"landed": best[0], "clean": best[1]},
-        "ratio": {"landed": own[0] / best[0], "clean": own[1] / best[1]},
-    }
+def ratio(values: npt.ArrayLike, others: npt.ArrayLike) -> Data:
+    """Mean over mean of two measures of the same flights, with its 95 % interval."""
+    a, b = np.asarray(values, dtype=np.float64), np.asarray(others, dtype=np.float64)
+    value = float(a.mean() / b.mean())
+    half = float(student95(a.size - 1) * (a - value * b).std(ddof=1) / (b.mean() * np.sqrt(a.size)))
+    return {"value": value, "interval": [value - half, value + half]}
 
 
 def over(bench: Bench, policy: PolicyFile, *names: str) -> Data:
@@ -220,29 +225,47 @@ def over(bench: Bench, policy: PolicyFile, *names: str) -> Data:
         task = policy.tasks[0]
         bench.say(f"{N_APPROACHES} approaches, {name}: {task.vehicle}, {task.gear}, {task.sensing or 'own sensors'}")
         place = Place.of(assess.shaped(task) if name == "shaped" else task)
-        approaches = Series([BOX if name == "box" else PLANE], SEED, Purpose.ASSESS).next(N_APPROACHES)
+        approaches = assess.fresh(BOX if name == "box" else PLANE, N_APPROACHES, SEED)
         (flown,) = fly([place], policy.form, theta, approaches, bench.threads)
-        landed, spotless = share_of(four_leg(flown)), share_of(clean(flown))
-        found[name] = {
-            "landed": landed.value, "landed_interval": [landed.low, landed.high],
-            "clean": spotless.value, "clean_interval": [spotless.low, spotless.high], "flights": landed.n,
-        }  # fmt: skip
+        found[name] = rates(flown)
     return found
+
+
+def rates(flown: Outcomes) -> Data:
+    """Shares of landings and of clean ones."""
+    landed, spotless = share_of(four_leg(flown)), share_of(clean(flown))
+    return {
+        "landed": landed.value, "landed_interval": [landed.low, landed.high],
+        "clean": spotless.value, "clean_interval": [spotless.low, spotless.high], "flights": landed.n,
+    }  # fmt: skip
 
 
 def gears(bench: Bench) -> Data:
     """Six gears of the authors' simulation, and the vehicle that flew, with a policy each."""
     found: Data = {}
-    for gear in GEARS:
-        policy = bench.learned(*(LONG if gear in HARD else (*QUICK, *OVER_BOX)), f"gear={gear}")
-        found[f"habas2021, as_simulated, {gear}"] = {**about(policy), **beside_ceiling(bench, policy)}
-    for form, gear in OTHER_FORMS:
-        policy = bench.learned(*LONG, f"gear={gear}", f"form={form}")
-        found[f"habas2021, as_simulated, {gear}, `{form}`"] = {**about(policy), **beside_ceiling(bench, policy)}
-    for gear in ("wide_short", "wide_long"):
-        policy = bench.learned(*LONG, *FLOWN, f"gear={gear}")
-        found[f"crazyflie21, table1, {gear}"] = {**about(policy), **beside_ceiling(bench, policy, NOISY)}
+    for name, settings, effort in _of_gears():
+        policy = bench.learned(*settings)
+        found[name] = {**about(policy), **beside_cells(bench, policy, effort)}
     return found
+
+
+def _of_gears() -> list[tuple[str, tuple[str, ...], Effort]]:
+    """Title of a row, what its policy is learned with, and the effort for the best of each cell."""
+    rows = [
+        (f"habas2021, as_simulated, {gear}", (*(LONGER if gear in HARD else LONG), f"gear={gear}"), EFFORT)
+        for gear in GEARS
+    ]
+    rows += [
+        (f"habas2021, as_simulated, {gear}, `{form}`", (*LONGER, f"gear={gear}", f"form={form}"), EFFORT)
+        for form, gear in OTHER_FORMS
+    ]
+    rows += [(f"crazyflie21, table1, {gear}", nominal(gear), NOISY) for gear in FLOWN_GEARS]
+    return rows
+
+
+def nominal(gear: str) -> tuple[str, ...]:
+    """What the policy of the vehicle that flew is learned with."""
+    return (*LONGER, *FLOWN, f"gear={gear}")
 
 
 def forms(bench: Bench) -> Data:
@@ -271,37 +294,48 @@ def _constant(bench: Bench, chosen: general.GeneralExperiment) -> Data:
 
 def family(bench: Bench) -> Data:
     """A policy of the nominal vehicle beside one of drawn vehicles, searched on from the same start."""
-    found: Data = {}
-    for gear in ("wide_long",):
-        begin = bench.learned(*LONG, *FLOWN, f"gear={gear}")
-        over_drawn = (f"drawn.n_vehicles={N_FAMILY}", "drawn.seed=1")
-        policies = {
-            "nominal": bench.learned(*FAMILY_ON, *FLOWN, f"gear={gear}", *_shared_by(1), start=begin),
-            "family": bench.learned(
-                *FAMILY_ON, *FLOWN, f"gear={gear}", *over_drawn, *_shared_by(N_FAMILY), start=begin
-            ),
+    return {f"crazyflie21, table1, {gear}": _family(bench, gear) for gear in ("wide_long",)}
+
+
+def _family(bench: Bench, gear: str) -> Data:
+    policies = {name: searched_on(bench, gear, name == "family") for name in ("nominal", "family")}
+    places = Place.of(policies["nominal"].tasks[0]).members(Drawn(n_vehicles=N_DRAWN, seed=SEED), Purpose.FAMILY_ASSESS)
+    batches = Series([BOX], SEED, Purpose.ASSESS).for_each(len(places), N_EACH)
+    row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY}
+    flights: dict[str, list[Outcomes]] = {}
+    for name, policy in policies.items():
+        bench.say(f"{N_DRAWN} vehicles, {gear}: {name}")
+        theta = General(policy.form).always_go(policy.values)
+        flights[name] = fly(places, policy.form, theta, batches, bench.threads)
+        row[name] = {
+            **about(policy), **of_vehicles(flights[name]), "nominal_box": over(bench, policy, "box")["box"],
         }  # fmt: skip
-        drawn = Drawn(n_vehicles=N_DRAWN, seed=SEED)
-        places = Place.of(begin.tasks[0]).members(drawn, Purpose.FAMILY_ASSESS)
-        batches = Series([BOX], SEED, Purpose.ASSESS).for_each(len(places), N_EACH)
-        row: Data = {"vehicles": N_DRAWN, "flights": N_EACH, "learned_over": N_FAMILY}
-        landed: dict[str, FloatArray] = {}
-        for name, policy in policies.items():
-            bench.say(f"{N_DRAWN} vehicles, {gear}: {name}")
-            flown = fly(places, policy.form, General(policy.form).always_go(policy.values), batches, bench.threads)
-            landed[name] = np.array([four_leg(o).mean() for o in flown])
-            row[name] = {
-                **about(policy),
-                "landed": float(landed[name].mean()),
-                "clean": float(np.mean([clean(o).mean() for o in flown])),
-                "worst_tenth": float(np.sort(landed[name])[: -(-N_DRAWN // 10)].mean()),
-                "nominal_box": over(bench, policy, "box")["box"],
-            }
-        gain = landed["family"] - landed["nominal"]
-        half = float(student95(gain.size - 1) * gain.std(ddof=1) / np.sqrt(gain.size))
-        row["gain"] = {"landed": float(gain.mean()), "half": half, "better": int((gain > 0).sum())}
-        found[f"crazyflie21, table1, {gear}"] = row
-    return found
+    gain = landed_of(flights["family"]) - landed_of(flights["nominal"])
+    half = float(student95(gain.size - 1) * gain.std(ddof=1) / np.sqrt(gain.size))
+    row["gain"] = {"landed": float(gain.mean()), "half": half, "better": int((gain > 0).sum())}
+    return row
+
+
+def landed_of(flown: Sequence[Outcomes]) -> FloatArray:
+    """Share of landings of each vehicle."""
+    return np.array([four_leg(outcomes).mean() for outcomes in flown])
+
+
+def of_vehicles(flown: Sequence[Outcomes]) -> Data:
+    """Landed and clean over all vehicles, and landed of those that land least."""
+    landed = landed_of(flown)
+    return {
+        "landed": float(landed.mean()),
+        "clean": float(np.mean([clean(outcomes).mean() for outcomes in flown])),
+        "worst_tenth": worst_tenth(landed),
+    }
+
+
+def searched_on(bench: Bench, gear: str, over_drawn: bool) -> PolicyFile:
+    """The search on from the policy of the vehicle of the files, on it or on drawn vehicles."""
+    drawn = (f"drawn.n_vehicles={N_FAMILY}", "drawn.seed=1") if over_drawn else ()
+    shared = _shared_by(N_FAMILY if over_drawn else 1)
+    return bench.learned(*FAMILY_ON, *FLOWN, f"gear={gear}", *drawn, *shared, start=bench.learned(*nominal(gear)))
 
 
 def _shared_by(n_vehicles: int) -> tuple[str, str]:

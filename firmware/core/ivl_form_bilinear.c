@@ -7,8 +7,7 @@ enum
 {
     NODES_X = 5,  // v_x = 0, 1 .. 4 m/s
     NODES_Z = 6,  // v_z = 0, 0.8 .. 4 m/s
-    REST = NODES_X * NODES_Z,
-    N_PARAMS = REST + IVL_GENERAL_N
+    N_NODES = NODES_X * NODES_Z,
 };
 
 static const float PER_STEP_X = 1.0f;
@@ -18,7 +17,7 @@ static const float PER_STEP_Z = 1.25f;
 #define ROW_SYMBOLS(x) "R_" #x "0 R_" #x "1 R_" #x "2 R_" #x "3 R_" #x "4 R_" #x "5"
 
 static const ivl_form_group_t GROUPS[] = {
-    {REST, 0.5f, 20.0f,
+    {N_NODES, 0.5f, 20.0f,
      IVL_FORM_TEXT(1.0f, "1/s", ROW_NAMES(0) " " ROW_NAMES(1) " " ROW_NAMES(2) " " ROW_NAMES(3) " " ROW_NAMES(4),
                    ROW_SYMBOLS(0) " " ROW_SYMBOLS(1) " " ROW_SYMBOLS(2) " " ROW_SYMBOLS(3) " " ROW_SYMBOLS(4),
                    "threshold of RREV at v_x = 0, 1 .. 4 m/s (first digit) and v_z = 0, 0.8 .. 4 m/s (second digit)")},
@@ -45,25 +44,12 @@ static float along_z(const float row[], place_t z)
     return row[z.node] + z.part * (row[z.node + 1] - row[z.node]);
 }
 
-static ivl_action_t decide(const float theta[], const ivl_seen_t *seen)
+static float threshold_per_s(const float nodes[], const ivl_point_t *p)
 {
-    const ivl_point_t p = ivl_general_point(seen);
-    const place_t     x = place(p.vx_mps * PER_STEP_X, NODES_X), z = place(p.vz_mps * PER_STEP_Z, NODES_Z);
-    const float      *row = theta + x.node * NODES_Z;
-    const float       low = along_z(row, z), high = along_z(row + NODES_Z, z);
-    return ivl_general_action(theta + REST, seen, p.x, p.z, low + x.part * (high - low));
+    const place_t x = place(p->vx_mps * PER_STEP_X, NODES_X), z = place(p->vz_mps * PER_STEP_Z, NODES_Z);
+    const float  *row = nodes + x.node * NODES_Z;
+    const float   low = along_z(row, z), high = along_z(row + NODES_Z, z);
+    return low + x.part * (high - low);
 }
 
-static float moment_most_Nm(const float theta[])
-{
-    return ivl_general_moment_most_Nm(theta + REST);
-}
-
-const ivl_form_t ivl_form_bilinear = {
-    .name = "bilinear",
-    IVL_FORM_DOC("for every approach: threshold of RREV from a table over the sensed velocities, moment, go / no-go").groups = GROUPS,
-    .n_groups = 1 + IVL_GENERAL_N_GROUPS,
-    .n_params = N_PARAMS,
-    .decide = decide,
-    .moment_most_Nm = moment_most_Nm,
-};
+IVL_GENERAL_FORM(bilinear, N_NODES, "for every approach: threshold of RREV from a table over the sensed velocities, moment, go / no-go");

@@ -30,11 +30,11 @@ float ivl_general_poly3(const float c[], float x, float z)
     return ivl_general_poly2(c, x, z) + xx * (x * c[6] + z * c[7]) + zz * (x * c[8] + z * c[9]);
 }
 
-ivl_action_t ivl_general_action(const float rest[], const ivl_seen_t *seen, float x, float z, float threshold_per_s)
+ivl_action_t ivl_general_action(const float rest[], const ivl_seen_t *seen, const ivl_point_t *p, float threshold_per_s)
 {
     const float *go = rest + IVL_GENERAL_N_MOMENT;
-    const float  p_land = ivl_logistic(ivl_general_poly3(go + 1, x, z));
-    const float  moment_Nm = rest[0] + rest[1] * x + rest[2] * z;
+    const float  p_land = ivl_logistic(ivl_general_poly3(go + 1, p->x, p->z));
+    const float  moment_Nm = rest[0] + rest[1] * p->x + rest[2] * p->z;
     return (ivl_action_t){
         .flip = seen->cues.rrev_per_s >= ivl_clamp(threshold_per_s, RREV_PER_S_MIN, RREV_PER_S_MAX),
         .go = p_land >= go[0],

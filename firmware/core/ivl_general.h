@@ -17,6 +17,14 @@ typedef struct
 
 ivl_point_t ivl_general_point(const ivl_seen_t *seen);
 
+// clang-format off
+/// Group of a polynomial's parameters, the threshold in 1/s.
+#define IVL_GENERAL_POLYNOMIAL(n_, names_, symbols_)                                                                                         \
+    {n_, -40.0f, 40.0f, IVL_FORM_TEXT(1.0f, "1/s", names_, symbols_,                                                                         \
+        "threshold of RREV, 0.5 to 20 1/s: coefficients of 1, x = (v_x - 1.4 m/s) / (2 m/s), z = (v_z - 1.6 m/s) / (2 m/s) "                 \
+        "and their products")}
+// clang-format on
+
 /// Polynomial of the second degree, 6 coefficients: 1, x, z, xx, xz, zz.
 float ivl_general_poly2(const float c[], float x, float z);
 
@@ -42,9 +50,34 @@ float ivl_general_poly3(const float c[], float x, float z);
 #define IVL_GENERAL_N_GROUPS 3
 
 /// The action of a form whose threshold is known.
-/// @param[in] rest  the IVL_GENERAL_N parameters behind those of the threshold
-ivl_action_t ivl_general_action(const float rest[], const ivl_seen_t *seen, float x, float z, float threshold_per_s);
+/// @param[in] rest             the IVL_GENERAL_N parameters behind those of the threshold
+/// @param[in] p                ivl_general_point(seen)
+/// @param[in] threshold_per_s  of RREV; limited to 0.5..20 1/s
+ivl_action_t ivl_general_action(const float rest[], const ivl_seen_t *seen, const ivl_point_t *p, float threshold_per_s);
 
 /// Largest moment of any p: the moment is linear, so it is that of a corner.
 float ivl_general_moment_most_Nm(const float rest[]);
+
+/// The row of a form for every approach, with the functions that the row names.  Its file has before it
+///     static const ivl_form_group_t GROUPS[]                                  what the threshold_n_ parameters of the threshold mean,
+///                                                                             in one group, then IVL_GENERAL_GROUPS
+///     static float threshold_per_s(const float c[], const ivl_point_t *p)     the threshold of RREV at p
+#define IVL_GENERAL_FORM(name_, threshold_n_, doc_)                                                                                        \
+    static ivl_action_t decide(const float theta[], const ivl_seen_t *seen)                                                                \
+    {                                                                                                                                      \
+        const ivl_point_t p = ivl_general_point(seen);                                                                                     \
+        return ivl_general_action(theta + (threshold_n_), seen, &p, threshold_per_s(theta, &p));                                           \
+    }                                                                                                                                      \
+    static float moment_most_Nm(const float theta[])                                                                                       \
+    {                                                                                                                                      \
+        return ivl_general_moment_most_Nm(theta + (threshold_n_));                                                                         \
+    }                                                                                                                                      \
+    const ivl_form_t ivl_form_##name_ = {                                                                                                  \
+        .name = #name_,                                                                                                                    \
+        IVL_FORM_DOC(doc_).groups = GROUPS,                                                                                                \
+        .n_groups = 1 + IVL_GENERAL_N_GROUPS,                                                                                              \
+        .n_params = (threshold_n_) + IVL_GENERAL_N,                                                                                        \
+        .decide = decide,                                                                                                                  \
+        .moment_most_Nm = moment_most_Nm,                                                                                                  \
+    }
 #endif  // IVL_GENERAL_H

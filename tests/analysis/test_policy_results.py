@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import policies
 import policy_measure
 import policy_results as tool
 import policy_text
 import pytest
-from policy_measure import Bench, Cells
+from policy_measure import Bench
 
 from ivl import forms, native
 from ivl.policy import general
-from ivl.policy.region import BOX
-from ivl.seeds import Purpose
+from ivl.policy.cells import Effort
 
 ROOT = Path(__file__).parents[2]
 Capture = pytest.CaptureFixture[str]
@@ -94,24 +94,32 @@ def test_every_policy_of_the_data_is_one_that_a_vehicle_accepts(committed: dict[
         assert f"{form.crc(row['theta']):08x}" == row["crc"]
 
 
-def test_the_cells_of_a_ceiling_are_the_middles_of_the_box() -> None:
-    cells = Cells(n_axis=2)
-    choose, judge = (cells.approaches(3, 0, purpose) for purpose in (Purpose.SELECT, Purpose.ASSESS))
-    assert judge.speed_mps.tolist() == [2.0] * 6 + [3.0] * 6
-    assert judge.angle_deg.tolist() == ([45.0] * 3 + [75.0] * 3) * 2
-    assert BOX.speeds_mps == [1.5, 3.5]
-    assert len(set(judge.stream.tolist())) == 12
-    assert choose.seed != judge.seed
+def test_a_policy_beside_the_best_of_each_cell_is_on_the_same_flights(tmp_path: Path, monkeypatch: Any) -> None:
+    monkeypatch.setattr(policy_measure, "N_APPROACHES", 150)
+    monkeypatch.setattr(
+        policy_measure, "CELLS", general.MapSettings(n_speeds=2, n_angles=2, n_thresholds=12, moments_norm=[0.9])
+    )
+    found = policy_measure.beside_cells(Bench(tmp_path, lambda _: None), policies.by_hand(), Effort(n_choose=8))
+    assert found["box"]["flights"] == found["best"]["flights"] == 150
+    assert found["box"]["landed"] > 0.9
+    assert 0.1 < found["best"]["clean"] <= found["best"]["landed"] < found["box"]["landed"]  # cells far too large
+    ratio = found["ratio"]["landed"]
+    assert ratio["value"] == pytest.approx(found["box"]["landed"] / found["best"]["landed"])
+    assert ratio["interval"][0] <= ratio["value"] <= ratio["interval"][1]
 
 
-def test_the_best_of_each_cell_lands_where_a_policy_for_all_does_not(tmp_path: Path) -> None:
-    """Steep and fast cells land with a policy of their own; the grid must find it, and judge it on other flights."""
-    bench = Bench(tmp_path, lambda _: None)
-    task = general.load([policy_measure.EXPERIMENT]).tasks[0]
-    best, judge = policy_measure.ceiling(bench, task, Cells(n_axis=2, n_choose=8, n_judge=10))
-    assert len(judge) == 4 * 10
-    assert best[0] > 0.9
-    assert 0.5 < best[1] <= best[0]
+def test_the_interval_of_a_ratio_knows_that_the_flights_are_the_same() -> None:
+    rng = np.random.default_rng(3)
+    true, covered, widths = 0.8 / 0.9, 0, []
+    for _ in range(400):
+        best = rng.random(300) < 0.9
+        own = best & (rng.random(300) < 0.8 / 0.9)
+        found = policy_measure.ratio(own, best)
+        covered += found["interval"][0] <= true <= found["interval"][1]
+        widths.append(found["interval"][1] - found["interval"][0])
+    assert 0.92 < covered / 400 < 0.98
+    apart = policy_measure.ratio(own, rng.permutation(best))
+    assert apart["interval"][1] - apart["interval"][0] > np.mean(widths)
 
 
 def test_a_policy_is_learned_once_for_equal_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

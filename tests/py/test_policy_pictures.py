@@ -18,12 +18,11 @@ from ivl.outcome import Outcomes, four_leg, verdict
 from ivl.plots import policy as pictures
 from ivl.plots import policy_flow_space, policy_go, policy_rates, policy_surface, strobe, style
 from ivl.policy import assess as judging
-from ivl.policy import file, go
+from ivl.policy import cells, file, go
 from ivl.policy.flying import Place, fly, fly_own
 from ivl.policy.general import MapSettings
 from ivl.policy.region import BOX, PLANE, Approaches
 from ivl.policy.shape import General
-from ivl.policy.start import Map
 from ivl.policy.survey import Path as FlownPath
 from ivl.policy.survey import Survey, survey
 from ivl.task import settings_of
@@ -93,30 +92,63 @@ def test_box_and_plane_are_drawn_where_they_are_commanded() -> None:
 # ---- rates
 
 
-def made_up(scores: np.ndarray) -> Map:
-    """A map of one place in which a flight lands where the number is 1, of shape (moments, thresholds, cells)."""
-    outcomes: Outcomes = np.zeros(scores.shape, dtype=native.library().outcome_dtype)
-    outcomes["n_legs"] = 4 * scores
-    edges = np.array([1.0, 2.0, 4.0]), np.array([20.0, 50.0, 90.0])
-    return Map(*edges, np.array([0.1, 0.2, 0.25, 0.4]), 1e-3, np.array([5.0, 7.0]), [outcomes])
-
-
-def test_the_best_of_a_cell_and_of_all_are_those_that_land() -> None:
-    scores = np.zeros((2, 4, 4))
-    for cell, (moment, threshold) in enumerate([(0, 0), (1, 2), (1, 3), (0, 2)]):
-        scores[moment, threshold, cell] = 1.0
-    scores[1, 2, 2] = 1.0
-    flown = made_up(scores)
-    assert flown.best_of_all() == (4.0, 7.0)  # lands in two cells
-    best = flown.best_of_cells()
-    assert best[[0, 1, 3]].tolist() == [[10.0, 5.0], [4.0, 7.0], [4.0, 5.0]]
-    assert best[2, 1] == 7.0
+def test_approaches_lie_all_over_their_own_cell() -> None:
+    some = cells.Cells.of(BOX, 4, 3)
+    drawn, other = some.draw(50, seed=3), some.draw(50, seed=4)
+    number = some.number_of(drawn.speed_mps, drawn.angle_deg)
+    assert number.tolist() == np.repeat(np.arange(12), 50).tolist()
+    assert len(set(drawn.stream.tolist())) == 600
+    for of in (drawn.speed_mps, drawn.angle_deg):
+        assert len(np.unique(of)) == 600
+    inside = (drawn.speed_mps - 1.5) % 0.5
+    assert inside.min() < 0.01 < 0.49 < inside.max()
+    assert not np.isin(other.speed_mps, drawn.speed_mps).any()
 
 
 def test_an_approach_belongs_to_the_cell_around_it() -> None:
-    flown = made_up(np.zeros((2, 4, 4)))
-    speed, angle = np.array([1.0, 1.9, 2.0, 3.9, 4.0]), np.array([20.0, 60.0, 49.0, 90.0, 51.0])
-    assert flown.cell_of(speed, angle).tolist() == [0, 1, 2, 3, 3]
+    some = cells.Cells(np.array([1.0, 2.0, 4.0]), np.array([20.0, 50.0, 90.0]))
+    speed, angle = np.array([1.0, 1.9, 2.0, 3.9, 4.0, 0.5]), np.array([20.0, 60.0, 49.0, 90.0, 51.0, 95.0])
+    assert some.number_of(speed, angle).tolist() == [0, 1, 2, 3, 3, 1]
+
+
+def made_up(scores: np.ndarray, n: int) -> Outcomes:
+    """Flights (..., cells * n) of which the n of each cell score what is said of it: 1, 1/2 or 0."""
+    numbers = np.repeat(scores, n, axis=-1)
+    outcomes: Outcomes = np.zeros(numbers.shape, dtype=native.library().outcome_dtype)
+    outcomes["n_legs"], outcomes["body_contact"] = 4 * (numbers > 0), numbers == 0.5
+    return outcomes
+
+
+def test_the_best_of_a_cell_wins_on_flights_that_did_not_propose_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid = MapSettings(n_speeds=2, n_angles=2, n_thresholds=4, tau_s=[0.1, 0.4], moments_norm=[0.5, 0.9])
+    scores = np.zeros((2, 4, 4))
+    for cell, (moment, threshold) in enumerate([(0, 0), (1, 2), (1, 3), (0, 2)]):
+        scores[moment, threshold, cell] = 1.0
+    scores[1, 2, 2] = 0.5
+    finals = np.zeros((5, 4))
+    finals[[0, 0, 1, 0], range(4)] = 1.0
+    monkeypatch.setattr(cells, "fly", lambda *_: [made_up(scores, 2)])
+    monkeypatch.setattr(cells, "fly_own", lambda *_: [made_up(finals, 16)])
+    place = Place.of(TASK)
+    best = cells.best_of_cells(grid, BOX, 0, [place])
+    low, high = (place.world.derived()["moment_y_max_Nmm"] * part for part in (0.5, 0.9))
+    assert best.of_all == pytest.approx((1 / 0.3, high))  # lands in two cells
+    third = [1 / 0.3, high]  # second on the grid
+    assert best.theta == pytest.approx(np.array([[10.0, low], [1 / 0.3, high], third, [1 / 0.3, low]]))
+    assert best.n_flights == 2 * 4 * 8 + 5 * 64
+
+
+def test_the_best_of_each_cell_beats_one_policy_for_all_on_fresh_approaches() -> None:
+    places = [Place.of(TASK)]
+    grid = MapSettings(n_speeds=5, n_angles=5, n_thresholds=20, tau_s=[0.12, 0.4], moments_norm=[0.9])
+    effort = cells.Effort(n_coarse=2, n_finalists=5, n_choose=16)
+    best = cells.best_of_cells(grid, BOX, 1, places, effort)
+    approaches = judging.fresh(BOX, 200, seed=2)
+    (own,) = fly_own(places, forms.PAPER, best.of(approaches), approaches)
+    (one,) = fly(places, forms.PAPER, best.of_all, approaches)
+    assert four_leg(own).mean() > four_leg(one).mean() > 0.8
+    again = cells.best_of_cells(grid, BOX, 1, places, effort)
+    assert np.array_equal(best.theta, again.theta)
 
 
 def test_each_approach_is_flown_with_its_own_policy(found: Survey) -> None:
@@ -156,7 +188,7 @@ def test_the_rates_are_those_of_the_flights_that_assess_counts(found: Survey) ->
 
 
 def test_the_constant_policy_is_the_best_of_the_map_or_the_one_that_is_said(found: Survey) -> None:
-    assert found.constant == found.map.best_of_all()
+    assert found.constant == found.best.of_all
     said = survey(policies.by_hand(), 8, seed=5, grid=GRID, constant=(4.8, 8.0))
     (direct,) = fly([Place.of(TASK)], forms.PAPER, [4.8, 8.0], said.approaches)
     assert said.by_constant[0].tobytes() == direct.tobytes()
@@ -221,7 +253,7 @@ def test_every_path_is_drawn_in_all_views(found: Survey) -> None:
     n_surface = len(range(0, policy_flow_space._N_LINES, policy_flow_space._N_LINES // 4))
     for axis in (upper, lower):
         assert len(axis.lines) == 2 * 40 + n_surface
-        assert len(axis.collections[0].get_offsets()) == len(found.landable()) > 0
+        assert len(axis.collections[0].get_offsets()) == len(found.best.landable()) > 0
     assert upper.get_ylabel().startswith("RREV")
     assert lower.get_xlabel().startswith("$d$")
 

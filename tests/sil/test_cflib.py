@@ -16,7 +16,7 @@ import cflib.crtp
 import pytest
 from cflib.crazyflie.log import LogConfig
 
-from ivl import native, silproc
+from ivl import forms, native, silproc
 from ivl.errors import LinkError
 from ivl.experiment import load
 from ivl.silproc import SilProcess
@@ -283,6 +283,29 @@ def test_console_text_of_the_app_is_heard(sil, connected, wait_for):
 
 
 # ---- reconnecting
+
+
+def test_a_policy_stays_in_force_when_its_client_goes(sil, connected, wait_for):
+    form = forms.by_name("polynomial2")
+    values = [0.5 * (p.lo + p.hi) for p in form.params]
+    theta, crc = form.to_si(values).astype("<f4"), form.crc(values)
+
+    def part(seq: int, crc_sent: int, number: int) -> bytes:
+        head = struct.pack("<BBLLBBB", 1, 2, seq, crc_sent, form.number, form.n, number)
+        return head + theta[4 * number : 4 * number + 4].tobytes().ljust(16, b"\0")
+
+    in_force = struct.pack("<LLB", 7, crc, form.number)
+    for seq, crc_sent, status in ((7, crc, 0), (8, crc ^ 1, None)):  # the second one is spoiled
+        with connected(sil.uri) as cf:
+            answers: list[bytes] = []
+            cf.appchannel.packet_received.add_callback(lambda data, heard=answers: heard.append(bytes(data)))
+            for number in range(-(-form.n // 4)):
+                cf.appchannel.send_packet(part(seq, crc_sent, number))
+            wait_for(
+                "the echo", lambda heard=answers, n=seq: any(a[:6] == struct.pack("<BBL", 0x81, 2, n) for a in heard)
+            )
+            wait_for("the answer", lambda heard=answers: heard[-1][9:18] == in_force)
+            assert (answers[-1][6] == 0) == (status == 0)
 
 
 def test_twenty_connections_in_a_row_leave_nothing_behind(fast, connected, wait_for):

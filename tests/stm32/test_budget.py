@@ -1,11 +1,13 @@
 """The tools that measure the core: they must find what they look for."""
 
+import re
 import subprocess
 from pathlib import Path
 
 import budget
 import cycles
 import objects
+import parts
 import pytest
 import recording
 from replay import ROOT
@@ -131,3 +133,17 @@ def test_core_keeps_the_rules(build: Path) -> None:
     assert len(parts) == len(list((ROOT / "firmware" / "core").glob("*.c")))
     assert objects.broken_rules(parts) == []
     assert objects.variable_bytes(parts) == 0
+
+
+def test_a_part_that_is_not_there_is_not_taken_out(tmp_path: Path) -> None:
+    """The cost of a part is nothing when the core without it is the core with it."""
+    header = tmp_path / "ivl_form.h"
+    header.write_text("#define X_ALL(X) \\\n    X(one)  \\\n    X(two)  \\\n    X(three)\n", encoding="utf-8")
+    parts._take_out(header, "    X(two)")
+    assert header.read_text(encoding="utf-8") == "#define X_ALL(X) \\\n    X(one)  \\\n    X(three)\n"
+    with pytest.raises(RuntimeError, match=r"ivl_form\.h: no row X\(two\)"):
+        parts._take_out(header, "    X(two)")
+    core = ROOT / "firmware" / "core"
+    assert all((core / f"ivl_form_{name}.c").exists() for name in parts._FORMS)
+    declared = re.findall(r"^\w.*?\b(ivl_level_out_\w+)\(", (core / "ivl_level_out.h").read_text(), re.MULTILINE)
+    assert declared == re.findall(r"^\w.*?\b(ivl_level_out_\w+)\(", parts._NO_LEVEL_OUT, re.MULTILINE)

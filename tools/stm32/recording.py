@@ -27,7 +27,14 @@ class Recording:
     replies: Path
 
 
-def record(folder: Path, n_ticks: int, seed: int, fault_norm: float = 0.01, source: int | None = None) -> Recording:
+def record(
+    folder: Path,
+    n_ticks: int,
+    seed: int,
+    fault_norm: float = 0.01,
+    source: int | None = None,
+    form: str | None = None,
+) -> Recording:
     """Fly until `n_ticks` or more are recorded: six gears in turn, each batch with parameters and faults of its own.
 
     Args:
@@ -36,6 +43,7 @@ def record(folder: Path, n_ticks: int, seed: int, fault_norm: float = 0.01, sour
         seed: Of everything random.
         fault_norm: Chance per tick that a fault begins.
         source: `firmware.d_source` of all batches; None: each draws its own.
+        form: Form of the policies of all batches; None: each draws its own.
     """
     recording = Recording(folder / f"requests-{seed}.bin", folder / f"replies-{seed}.bin")
     rng = np.random.default_rng(seed)
@@ -45,16 +53,17 @@ def record(folder: Path, n_ticks: int, seed: int, fault_norm: float = 0.01, sour
             gear, vehicle = GEARS[n_batch % len(GEARS)], VEHICLES[n_batch // len(GEARS) % len(VEHICLES)]
             world = ivl.World(vehicle, gear, "as_simulated", **_overrides(rng), **_sensing(rng, source))
             attach(world)
-            flown += _fly(world, rng)
+            flown += _fly(world, rng, form)
             n_batch += 1
     return recording
 
 
-def _fly(world: ivl.World, rng: np.random.Generator) -> int:
+def _fly(world: ivl.World, rng: np.random.Generator, asked: str | None) -> int:
     """One batch with random approaches and policies; returns its ticks."""
     start = str(rng.choice(["imparted", "flown", "at_trigger"]))
     distance = rng.uniform(0.05, 0.6, _ROLLOUTS) if start == "at_trigger" else None
     form = str(rng.choice(_FORMS)) if rng.random() < _GENERAL_SHARE else forms.PAPER
+    form = asked or form
     outcomes = world.rollouts(
         rng.uniform(1.0, 4.0, _ROLLOUTS), rng.uniform(20.0, 90.0, _ROLLOUTS), *_policies(form, rng), form=form,
         seed=int(rng.integers(2**32)), start=start, d_ceil_m=distance, threads=1,

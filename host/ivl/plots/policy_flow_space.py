@@ -18,7 +18,7 @@ NAME = "policy_flow_space"
 _COLUMNS = ("of_y_radps", "rrev_per_s", "d_ceil_m")
 _N_LINES = 25
 _OUTER = 99.0
-"""Per cent of the landings of the map that the axes hold."""
+"""Per cent of the landings of the grid that the axes hold."""
 _COLORS = {"landed": style.BLUE, "failed": style.VERMILION, "no flip": style.GREY}
 
 
@@ -34,7 +34,7 @@ def draw(found: Survey, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pat
     figure = style.new_figure(8.2, 4.6)
     space, place = spaces.space_and_planes(figure, 0.56)
     place.remove()
-    good = found.landable()[:, [1, 0, 2]]
+    good = found.best.landable()[:, [1, 0, 2]]
     limits = _limits(good, surface(found.general, found.theta))
     mesh = _inside(surface(found.general, found.theta), limits)
     space.plot_surface(*np.moveaxis(mesh, -1, 0), color=style.GREEN, alpha=0.35, linewidth=0, shade=False)
@@ -95,7 +95,7 @@ def _kind(path: FlownPath) -> str:
 
 
 def _limits(good: FloatArray, mesh: FloatArray) -> FloatArray:
-    """Ranges of the axes, shape (3, 2): what the surface spans, and nearly all landings of the map."""
+    """Ranges of the axes, shape (3, 2): what the surface spans, and nearly all landings of the grid."""
     found = [mesh.reshape(-1, 3)]
     if len(good):
         found.append(np.percentile(good, [100.0 - _OUTER, _OUTER], axis=0))
@@ -113,6 +113,6 @@ def _inside(points: FloatArray, limits: FloatArray) -> FloatArray:
 
 def _handles() -> list[Any]:
     lines = [Line2D([], [], color=color, marker=".", label=f"approach, {kind}") for kind, color in _COLORS.items()]
-    region = Line2D([], [], color=style.ORANGE, marker=".", linestyle="none", label="flips of the map that land")
+    region = Line2D([], [], color=style.ORANGE, marker=".", linestyle="none", label="flips of the grid that land")
     own = Line2D([], [], color=style.GREEN, linewidth=2, label="surface R*; lines: equal speed")
     return [*lines, region, own]

@@ -30,11 +30,11 @@ def draw(found: Survey, paths: Sequence[Path], dpi: int = style.DPI) -> list[Pat
     panels = (
         (f"constant: {rrev:.2f} 1/s, {moment:.2f} N mm", found.by_constant),
         (f"{found.general.form.name}: every approach flown", found.by_policy),
-        ("best (RREV$_c$, M$_{yd}$) of each cell's middle", found.by_best),
+        ("best (RREV$_c$, M$_{yd}$) of each cell", found.by_best),
     )
     figure = style.new_figure(8.4, 3.9)
     axes = figure.subplots(1, 3, sharex=True, sharey=True)
-    speed, angle = found.map.speed_edges_mps, found.map.angle_edges_deg
+    speed, angle = found.best.cells.speed_edges_mps, found.best.cells.angle_edges_deg
     for axis, (title, flown) in zip(axes, panels, strict=True):
         image = axis.pcolormesh(angle, speed, found.rates(flown), cmap=RATE_MAP, vmin=0, vmax=1, rasterized=True)
         (v_lo, v_hi), (a_lo, a_hi) = BOX.speeds_mps, BOX.angles_deg

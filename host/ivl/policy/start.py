@@ -70,26 +70,6 @@ class Map:
         """Scores of each place, smoothed over the map's own error of the trigger's instant, or over another."""
         return [smooth(score(outcomes), self.tau_s, timing_s or self.timing_s) for outcomes in self.flown]
 
-    def best_of_all(self) -> tuple[float, float]:
-        """Threshold and moment with the best mean score over all cells and places."""
-        scores = np.mean([score(outcomes).mean(axis=-1) for outcomes in self.flown], axis=0)
-        moment, threshold = np.unravel_index(int(np.argmax(scores)), scores.shape)
-        return float(1.0 / self.tau_s[threshold]), float(self.moments_Nmm[moment])
-
-    def best_of_cells(self) -> FloatArray:
-        """Threshold and moment with the best smoothed score of each cell, shape (cells, 2)."""
-        scores = np.mean(self.smoothed(), axis=0)
-        best = scores.reshape(-1, scores.shape[-1]).argmax(axis=0)
-        moment, threshold = np.unravel_index(best, scores.shape[:2])
-        return np.column_stack([1.0 / self.tau_s[threshold], self.moments_Nmm[moment]])
-
-    def cell_of(self, speed_mps: FloatArray, angle_deg: FloatArray) -> npt.NDArray[np.intp]:
-        """Number of the cell of each approach; one beyond the edges belongs to the cell at the edge."""
-        found = []
-        for values, edges in ((speed_mps, self.speed_edges_mps), (angle_deg, self.angle_edges_deg)):
-            found.append(np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2))
-        return np.asarray(found[0] * (len(self.angle_edges_deg) - 1) + found[1])
-
 
 def fly_map(
     grid: MapSettings,

@@ -1,7 +1,7 @@
 """Flights for the pictures of a policy: fresh approaches, by it, by the paper's policy and by the best of each cell.
 
 The approaches are those on which `ivl policy assess` judges the plane, so pictures and numbers are of the same flights.
-The paper's policy and the best of each cell are taken from a map, whose flights have other random numbers.
+The paper's policy and the best of each cell are looked for on other approaches (`ivl.policy.cells`).
 """
 
 from collections.abc import Sequence
@@ -13,13 +13,13 @@ from ivl import forms
 from ivl.outcome import Outcomes, four_leg
 from ivl.policy import go
 from ivl.policy.assess import fresh
+from ivl.policy.cells import BestOfCells, best_of_cells
 from ivl.policy.file import PolicyFile
 from ivl.policy.flying import Place, fly, fly_own
 from ivl.policy.general import MapSettings
 from ivl.policy.go import BoolArray
 from ivl.policy.region import PLANE, Approaches
 from ivl.policy.shape import FloatArray, General
-from ivl.policy.start import Map, fly_map
 
 N_PATHS = 40
 _TRACE_PERIOD_S = 0.002
@@ -54,9 +54,8 @@ class Survey:
         general: The form.
         theta: The policy's numbers.
         approaches: Approaches over the plane.
-        map: The map.
         constant: Threshold (1/s) and moment (N mm) of the paper's policy.
-        best: Those of each cell of the map, shape (cells, 2).
+        best: Those of each cell.
         by_constant: Outcomes of the paper's policy.
         by_policy: Outcomes of the policy.
         by_best: Outcomes of the best of each approach's cell.
@@ -66,9 +65,8 @@ class Survey:
     general: General
     theta: FloatArray
     approaches: Approaches
-    map: Map
     constant: tuple[float, float]
-    best: FloatArray
+    best: BestOfCells
     by_constant: list[Outcomes]
     by_policy: list[Outcomes]
     by_best: list[Outcomes]
@@ -93,15 +91,9 @@ class Survey:
         p, landed = (np.concatenate(part) for part in zip(*parts, strict=True))
         return p, landed
 
-    def landable(self) -> FloatArray:
-        """RREV, OF_y and distance at the triggers of all flips of the map that landed, shape (n, 3)."""
-        names = ("rrev_trigger", "of_y_trigger", "d_trigger_m")
-        good = [outcomes[four_leg(outcomes) & (outcomes["triggered"] == 1)] for outcomes in self.map.flown]
-        return np.concatenate([np.column_stack([outcomes[name] for name in names]) for outcomes in good])
-
     def _shares(self, true: Sequence[BoolArray]) -> FloatArray:
-        shape = (len(self.map.speed_edges_mps) - 1, len(self.map.angle_edges_deg) - 1)
-        cell = np.tile(self.map.cell_of(self.approaches.speed_mps, self.approaches.angle_deg), len(true))
+        cells, shape = self.best.cells, self.best.cells.shape
+        cell = np.tile(cells.number_of(self.approaches.speed_mps, self.approaches.angle_deg), len(true))
         count = np.bincount(cell, minlength=shape[0] * shape[1])
         hits = np.bincount(cell, weights=np.concatenate(true), minlength=shape[0] * shape[1])
         return np.asarray((hits / np.where(count > 0, count, np.nan)).reshape(shape))
@@ -120,9 +112,9 @@ def survey(
     Args:
         policy: A policy for every approach.
         n_approaches: Approaches over the plane, flown by three policies each.
-        seed: Their seed, and that of the map.
-        constant: Threshold (1/s) and moment (N mm) of the paper's policy; omitted: the best of the map.
-        grid: The map; omitted: that of an experiment that does not say otherwise.
+        seed: Their seed, and that of the search for the best of each cell.
+        constant: Threshold (1/s) and moment (N mm) of the paper's policy; omitted: the best of the grid.
+        grid: Cells, thresholds and moments; omitted: those of an experiment that does not say otherwise.
         threads: Worker threads; omitted: all processors.
 
     Raises:
@@ -135,20 +127,17 @@ def survey(
     free = general.always_go(theta)
     if constant is not None:
         forms.by_name(forms.PAPER).to_si(constant)
-    flown_map = fly_map(grid or MapSettings(), [PLANE], seed, general, places, threads)
-    constant = constant or flown_map.best_of_all()
-    best = flown_map.best_of_cells()
-    own = best[flown_map.cell_of(approaches.speed_mps, approaches.angle_deg)]
+    best = best_of_cells(grid or MapSettings(), PLANE, seed, places, threads=threads)
+    constant = constant or best.of_all
     return Survey(
         general=general,
         theta=theta,
         approaches=approaches,
-        map=flown_map,
         constant=constant,
         best=best,
         by_constant=fly(places, forms.PAPER, constant, approaches, threads),
         by_policy=fly(places, general.form.name, free, approaches, threads),
-        by_best=fly_own(places, forms.PAPER, own, approaches, threads),
+        by_best=fly_own(places, forms.PAPER, best.of(approaches), approaches, threads),
         paths=[_path(places[0], general, free, approaches, i) for i in range(min(N_PATHS, n_approaches))],
     )
 

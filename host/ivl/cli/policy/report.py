@@ -26,7 +26,7 @@ Examples:
   ivl policy report g.yaml --out page.html --approaches 200 --open
       fewer flights, wider intervals; look at it at once
   ivl policy report g.yaml --out page.html --rrev 4.8 --moment 8
-      compare with this policy of the paper's form, in place of the best of the map
+      compare with this policy of the paper's form, in place of the best of a grid
 """
 
 
