@@ -26,7 +26,7 @@ from ivl.policy.file import PolicyFile
 from ivl.policy.flying import Drawn, Place, PolicyTask, fly, fly_own
 from ivl.policy.flying import score as score_of
 from ivl.policy.general import MapSettings
-from ivl.policy.region import BOX, PLANE, Approaches, Series
+from ivl.policy.region import BOX, PLANE, Series
 from ivl.policy.shape import General, is_general
 from ivl.policy.start import moment_most_Nmm
 from ivl.seeds import Purpose
