@@ -279,7 +279,6 @@ def list_logs(tour: Tour) -> str:
 
 def choose(tour: Tour, group: str, name: str) -> None:
     tour.show("Parameters")
-    tour.find(QLineEdit, "filterBox").setText(group)
     tree = tour.find(QTreeView, "paramTree")
     model = tree.model()
 
