@@ -243,6 +243,8 @@ def block_row(tour: Tour, name: str) -> Callable[[int], QModelIndex]:
 def start_block(tour: Tour) -> str:
     tour.show("Log Blocks")
     at = block_row(tour, "stabilizer")
+    if at(3).internalPointer().logging_started():  # the plotter drew it last
+        stop_block(tour)
     tour.find(QTreeView, "_block_tree").clicked.emit(at(3))
     tour.wait("the block runs", lambda: at(3).internalPointer().logging_started())
     return "stabilizer runs"
@@ -279,7 +281,6 @@ def list_logs(tour: Tour) -> str:
 
 def choose(tour: Tour, group: str, name: str) -> None:
     tour.show("Parameters")
-    tour.find(QLineEdit, "filterBox").setText(group)
     tree = tour.find(QTreeView, "paramTree")
     model = tree.model()
 
