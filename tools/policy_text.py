@@ -176,8 +176,8 @@ def _family(found: Data) -> list[str]:
         "### A family of vehicles",
         _paragraph(
             "Only the files of the vehicles that fly, and those of Table I, say how uncertain their numbers are",
-            "(`sigma`), so this is `crazyflie21`. Two searches begin with the policy of the table above, and have the",
-            f"same number of flights: one on the vehicle of the files, one on {first['learned_over']} vehicles drawn",
+            "(`sigma`), so this is `crazyflie21`. Two searches begin with the policy of the table above, and have",
+            f"about as many flights: one on the vehicle of the files, one on {first['learned_over']} vehicles drawn",
             f"from them. Both are judged over the box on the same {first['vehicles']} vehicles drawn anew,",
             f"{first['flights']} approaches each, landed / clean. The flight core of a drawn vehicle knows the mass,",
             "inertia and thrust of that vehicle.",
