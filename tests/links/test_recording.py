@@ -43,7 +43,8 @@ def test_a_software_vehicle_records_what_is_recorded_in_process(name: str) -> No
     assert np.isnan(there[:, battery]).all()  # of its power management, not of its rotors
     seen = np.isfinite(here)
     seen[:, battery] = False
-    assert (np.isfinite(there) == seen).mean() > 0.97
+    # the time of the contact scatters, so that of each signal the last sample before it may be left out in one of them
+    assert (np.isfinite(there) != seen).sum(axis=1).max() <= len(recording.SIGNALS)
     assert seen.sum() > 60
     for stem, (usual, largest) in _ERRORS.items():
         columns = [i for i, feature in enumerate(recording.NAMES) if feature.startswith(stem)]
