@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from ivl import family, forms, references, yamlfile
 from ivl.belief.recording import Flight
@@ -18,6 +18,8 @@ from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
 from ivl.rewards import RewardChoice
 from ivl.settings import PACKAGE_DIR, Finite, Strict, apply_setting, check_overrides, locate, read_mapping
+from ivl.site import file as site_file
+from ivl.site import place
 from ivl.task import Task
 from ivl.world import World
 
@@ -139,6 +141,12 @@ class Flown(PerParameter):
         return self
 
 
+def _site(path: str) -> str:
+    if not references.is_path(path):
+        raise ValueError("expected the path of a site file, such as lab.yaml; make one with: ivl site new lab.yaml")
+    return path
+
+
 class Named(Strict):
     """What a file calls itself."""
 
@@ -157,6 +165,9 @@ class Experiment(Task, Named):
     reward: RewardChoice = RewardChoice()
     check: Check = Check()
     flown: list[Flown] = Field(default_factory=list, description="real flights to draw beside the learning")
+    site: Annotated[str, AfterValidator(_site)] | None = Field(
+        default=None, description="site file of the room in which a drone flies it"
+    )
     seed: int = Field(default=0, ge=0, lt=2**63)
 
     @model_validator(mode="after")
@@ -260,6 +271,8 @@ def from_data(data: Any, label: str) -> Experiment:
     """Check plain data; `label` names it in errors."""
     experiment = yamlfile.validate(Experiment, data, label)
     check_overrides(experiment.overrides, label)
+    if experiment.site is not None:
+        experiment = place.at(experiment, site_file.load(experiment.site), Path(experiment.site).name)
     check_policy(experiment, label)
     try:
         experiment.make_learner(seed=0)

@@ -1,4 +1,4 @@
-"""Files that a file names: vehicle, gear set, sensor set.
+"""Files that a file names: vehicle, gear set, sensor set, site.
 
 A relative path is relative to the file that names it, or to the working directory if it was typed as an option. A run
 folder carries a copy of each such file under `files/NAME-DIGEST.yaml`, and its configuration names the copy. So the
@@ -17,8 +17,8 @@ from pydantic import BaseModel
 from ivl import files, yamlfile
 from ivl.errors import ConfigError
 
-FIELDS = ("vehicle", "gear_set", "sensing")
-"""Fields of a task that may name a file, in place of a name that ships with the package."""
+FIELDS = ("vehicle", "gear_set", "sensing", "site")
+"""Fields of a task or an experiment that may name a file; all but a site, in place of a name in the package."""
 FOLDER = "files"
 _DIGITS = 12
 _BYTES_MAX = yamlfile.N_BYTES_MAX
@@ -83,7 +83,8 @@ def pack(chosen: Model) -> tuple[Model, dict[str, bytes]]:
             return value
         return _copy(Path(value), copies)
 
-    changes: dict[str, Any] = {name: named(getattr(chosen, name)) for name in FIELDS}
+    present = [name for name in FIELDS if name in type(chosen).model_fields]
+    changes: dict[str, Any] = {name: named(getattr(chosen, name)) for name in present}
     if vary := getattr(chosen, "vary", None):
         changes["vary"] = {p: list(map(named, values)) if p in FIELDS else values for p, values in vary.items()}
     return chosen.model_copy(update=changes), copies
@@ -126,7 +127,7 @@ def _copy(path: Path, copies: dict[str, bytes]) -> str:
         content = path.read_bytes()[: _BYTES_MAX + 1]
     except (OSError, ValueError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
-    content = _with_own_includes(path, content, copies)
+    content = _with_own_files(path, content, copies)
     digest = hashlib.sha256(content).hexdigest()[:_DIGITS]
     stem = path.stem if path.stem.endswith(f"-{digest}") else f"{path.stem}-{digest}"
     name = f"{FOLDER}/{stem}{path.suffix}"
@@ -134,16 +135,25 @@ def _copy(path: Path, copies: dict[str, bytes]) -> str:
     return name
 
 
-def _with_own_includes(path: Path, content: bytes, copies: dict[str, bytes]) -> bytes:
-    """The content of a sensor set, which names copies of the files that it includes; of any other file as it is."""
-    if b"includes" not in content:
+def _with_own_files(path: Path, content: bytes, copies: dict[str, bytes]) -> bytes:
+    """The content of a sensor set or a site, which names copies of the files that it names; of any other file as it is.
+
+    A copy is named by its own name: it lies beside this one.
+    """
+    if b"includes" not in content and b"vehicle" not in content:
         return content
     data = yamlfile.read(path)
-    includes = data.get("includes") if isinstance(data, dict) else None
-    if not isinstance(includes, list) or not any(isinstance(one, str) and is_path(one) for one in includes):
+    if not isinstance(data, dict):
         return content
-    data["includes"] = [
-        Path(_copy(Path(absolute(one, path.parent)), copies)).name if isinstance(one, str) and is_path(one) else one
-        for one in includes
-    ]
-    return yamlfile.dump(data).encode()
+
+    def named(one: Any) -> Any:
+        if not isinstance(one, str) or not is_path(one):
+            return one
+        return Path(_copy(Path(absolute(one, path.parent)), copies)).name
+
+    changed = dict(data)
+    if isinstance(data.get("includes"), list):
+        changed["includes"] = [named(one) for one in data["includes"]]
+    if "vehicle" in data:
+        changed["vehicle"] = named(data["vehicle"])
+    return content if changed == data else yamlfile.dump(changed).encode()

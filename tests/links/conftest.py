@@ -1,7 +1,7 @@
 """Fixtures shared by the tests of the links. The package is imported before numpy, which it sets up."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import ivl  # isort: split
@@ -9,9 +9,11 @@ import ivl  # isort: split
 import numpy as np
 import pytest
 
-from ivl import experiment
+from ivl import experiment, yamlfile
 from ivl.experiment import Experiment
 from ivl.silproc import SilProcess
+from ivl.site import file as site_file
+from ivl.site import place
 from ivl.source import Plan
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -35,6 +37,29 @@ def vertical() -> Experiment:
         "check.grid.moment_y_Nmm={lo: 7.0, hi: 9.0, step: 1.0}",
     ]
     return experiment.load("experiments/paper_vertical.yaml", settings)
+
+
+@pytest.fixture(scope="session")
+def furnish(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Experiment], Experiment]:
+    """Put an experiment into a room of its own height and vehicle, as wide as no test needs."""
+
+    def put(chosen: Experiment) -> Experiment:
+        data = yamlfile.read(site_file.TEMPLATE)
+        data |= {"vehicle": chosen.vehicle, "not_measured": [], "mocap": None}
+        data["surface"] |= dict.fromkeys(("before_m", "beyond_m", "left_m", "right_m"), 5.0)
+        data["surface"]["height_m"] = chosen.make_world().params.values["world.ceiling_height"]
+        data["fence"] = {"x_m": [-50.0, 50.0], "y_m": [-50.0, 50.0], "z_m": [-10.0, 20.0]}
+        path = tmp_path_factory.mktemp("room") / "lab.yaml"
+        path.write_text(yamlfile.dump(data))
+        return place.at(chosen.model_copy(update={"site": str(path)}), site_file.load(str(path)), path.name)
+
+    return put
+
+
+@pytest.fixture(scope="session")
+def in_room(vertical: Experiment, furnish: Callable[[Experiment], Experiment]) -> Experiment:
+    """The same in a room."""
+    return furnish(vertical)
 
 
 @pytest.fixture

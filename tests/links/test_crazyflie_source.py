@@ -307,9 +307,9 @@ def test_ctrl_c_stops_cleanly_and_the_resumed_run_has_the_same_bits(
     assert rows_of(tmp_path / "link") == rows_of(tmp_path / "here")
 
 
-def test_nothing_is_created_when_the_vehicle_cannot_be_reached(vertical: Experiment, tmp_path: Path) -> None:
+def test_nothing_is_created_when_the_vehicle_cannot_be_reached(in_room: Experiment, tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="no Crazyradio is plugged in"):
-        run.run(vertical, tmp_path / "run", uri="radio://0/80/2M/E7E7E7E7E7")
+        run.run(in_room, tmp_path / "run", uri="radio://0/80/2M/E7E7E7E7E7")
     assert not (tmp_path / "run").exists()
 
 

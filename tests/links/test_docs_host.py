@@ -7,7 +7,7 @@ from pathlib import Path
 from ivl import native, silproc
 from ivl.links import clock, pil, preflight, vehicle
 from ivl.links.deadlines import DEADLINES
-from ivl.links.landing_flight import HEIGHT_M_MIN
+from ivl.startpoint import HEIGHT_M_MIN
 
 PAGE = (Path(__file__).parents[2] / "docs" / "HOST.md").read_text(encoding="utf-8")
 TEXT = " ".join(PAGE.split())  # wherever its lines are broken

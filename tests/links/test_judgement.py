@@ -1,6 +1,5 @@
-"""The outcome of a landing as a person and a recorder see it, and the questions in the terminal."""
+"""The outcome of a landing as a person and a recorder see it."""
 
-import io
 import math
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,14 +9,13 @@ import numpy as np
 import planes
 import pytest
 from planes import NORMALS
-from rich.console import Console
 
 from ivl import World, native
 from ivl.errors import RolloutError
 from ivl.links import packets, truth
 from ivl.links.landing_flight import check_abort
-from ivl.links.operators import ConsoleOperator, OperatorStopped, Seen
 from ivl.links.packets import Phase, Recording
+from ivl.links.trouble import Cause
 from ivl.links.truth import Resting
 from ivl.links.vehicle import Snapshot
 
@@ -134,64 +132,13 @@ def test_outcome_without_a_trigger_says_nothing_about_one(world: World) -> None:
 # ---- the terminal
 
 
-class Terminal(Console):
-    """A console with a person at it who types these lines."""
-
-    def __init__(self, *lines: str) -> None:
-        super().__init__(file=io.StringIO(), width=100)
-        self._lines = list(lines)
-
-    def input(self, *args: object, **kwargs: object) -> str:
-        del args, kwargs
-        if not self._lines:
-            raise EOFError
-        return self._lines.pop(0)
-
-    @property
-    def text(self) -> str:
-        assert isinstance(self.file, io.StringIO)
-        return self.file.getvalue()
-
-
-RESTING = Resting((0.0, 0.0, 2.96), (0.0, 0.0, -1.0))
-
-
-@pytest.mark.parametrize(
-    ("lines", "wanted"),
-    [
-        (("", ""), Seen(4, False)),
-        (("3", "y"), Seen(3, True)),
-        (("7", "2", "n"), Seen(2, False)),
-        (("d",), Seen(0, False, discard=True)),
-    ],
-)
-def test_outcome_is_confirmed_or_corrected_by_single_keys(lines: tuple[str, ...], wanted: Seen) -> None:
-    assert ConsoleOperator(Terminal(*lines)).confirm(Seen(4, False), RESTING, "") == wanted
-
-
-@pytest.mark.parametrize("lines", [("q",), ("4", "q"), ()])
-def test_operator_can_stop_at_any_question(lines: tuple[str, ...]) -> None:
-    with pytest.raises(OperatorStopped, match="can be resumed"):
-        ConsoleOperator(Terminal(*lines)).confirm(Seen(4, False), RESTING, "")
-
-
-def test_take_off_is_counted_down_and_the_battery_is_named() -> None:
-    terminal = Terminal("y", "y")
-    operator = ConsoleOperator(terminal, countdown_s=1)
-    operator.place((0.0, 0.0, 1.34))
-    operator.change_battery(3.42, 3.7)
-    assert "hover at 1.34 m" in terminal.text
-    assert "take-off in 1" in terminal.text
-    assert "BATTERY 3.42 V, needed 3.70 V" in terminal.text
-
-
 def test_recorder_constants_are_those_of_the_firmware() -> None:
     assert int.from_bytes(b"IVLR", "little") == packets.RECORD_MAGIC
 
 
 def aborted(rule: str, reason: str = "") -> Any:
     """What a vehicle remembers of an abort."""
-    return SimpleNamespace(aborted_by=rule, abort_reason=reason, spoiled_by="")
+    return SimpleNamespace(aborted_by=rule, abort_reason=reason, spoiled_by="", abort_cause=Cause.TRACKING)
 
 
 @pytest.mark.parametrize("rule", native.library().rules())

@@ -14,9 +14,10 @@ from ivl import cli, experiment
 from ivl.experiment import Experiment
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.landing_flight import Rollout, end_level_out, make_safe
-from ivl.links.operators import Seen
+from ivl.links.operators import Seen, Upcoming
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Request
+from ivl.links.trouble import Cause
 from ivl.links.truth import Resting
 from ivl.links.vehicle import Command, Vehicle
 from ivl.policy import file, use
@@ -26,6 +27,7 @@ from ivl.silproc import SilProcess
 from ivl.source import Plan
 from ivl.surface import Surface
 
+Furnish = Callable[[Experiment], Experiment]
 SLOW, FAST = (0.6, 60.0), (2.5, 60.0)
 """Approaches that the policy refuses and flies."""
 
@@ -36,12 +38,15 @@ class Script:
     def __init__(self) -> None:
         self.asked: list[str] = []
 
-    def place(self, start_W_m: tuple[float, float, float]) -> None:
-        assert start_W_m[2] > 0.3
+    def place(self, upcoming: Upcoming) -> None:
+        assert upcoming.start_W_m[2] > 0.3
         self.asked.append("place")
 
     def change_battery(self, battery_V: float, needed_V: float) -> None:
         raise AssertionError(f"battery {battery_V}, needed {needed_V}")
+
+    def help(self, cause: Cause, text: str) -> None:
+        raise AssertionError(f"{cause}: {text}")
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
         assert resting.p_W_m[2] < 0.2, "it stands on the floor"
@@ -131,9 +136,9 @@ def test_a_vehicle_that_comes_back_gets_the_policy_again(
 
 
 def test_a_rehearsal_ends_a_no_go_on_the_floor_with_the_outcome_of_the_simulator(
-    policy: PolicyFile, server: SilProcess, tmp_path: Path
+    policy: PolicyFile, server: SilProcess, tmp_path: Path, furnish: Furnish
 ) -> None:
-    chosen, script = flies(policy, SLOW), Script()
+    chosen, script = furnish(flies(policy, SLOW)), Script()
     with CrazyflieSource(server.uri, chosen, Options(tmp_path, script, rehearse=True)) as source:
         flown = list(source.fly(plan_of(chosen, 2)))
         assert source.n_discarded == 0
@@ -152,9 +157,9 @@ def test_a_rehearsal_ends_a_no_go_on_the_floor_with_the_outcome_of_the_simulator
 
 @pytest.mark.parametrize("level_out_s_max", [0.1, 0.3])  # long before it could hover
 def test_a_level_out_that_ends_in_a_scored_abort_is_still_a_no_go(
-    policy: PolicyFile, tmp_path: Path, level_out_s_max: float
+    policy: PolicyFile, tmp_path: Path, level_out_s_max: float, furnish: Furnish
 ) -> None:
-    chosen, script = flies(policy, SLOW, f"firmware.level_out_s_max={level_out_s_max}"), Script()
+    chosen, script = furnish(flies(policy, SLOW, f"firmware.level_out_s_max={level_out_s_max}")), Script()
     said: list[str] = []
     options = Options(tmp_path, script, rehearse=True, say=said.append)
     with SilProcess(chosen.make_world()) as process, CrazyflieSource(process.uri, chosen, options) as source:
@@ -205,8 +210,8 @@ def test_the_distance_of_a_level_out_is_that_from_the_surface_however_it_is_tilt
     assert flier.asked == (phase == Phase.LEVEL_OUT)
 
 
-def test_a_rehearsed_landing_tells_its_decision_too(policy: PolicyFile, server: SilProcess) -> None:
-    chosen = flies(policy, FAST)
+def test_a_rehearsed_landing_tells_its_decision_too(policy: PolicyFile, server: SilProcess, furnish: Furnish) -> None:
+    chosen = furnish(flies(policy, FAST))
     with CrazyflieSource(server.uri, chosen, Options(operator=Script(), rehearse=True)) as source:
         vehicle_of(source)  # the operator's script checks that a vehicle lies on the floor; one that hangs does not
         source._site._operator.confirm = lambda suggested, *_: suggested  # type: ignore[union-attr]
@@ -217,8 +222,10 @@ def test_a_rehearsed_landing_tells_its_decision_too(policy: PolicyFile, server: 
     assert outcome["d_decided_m"][0] == pytest.approx(known["d_decided_m"][0], abs=0.03)
 
 
-def test_a_vehicle_that_levels_out_is_brought_down_safely(policy: PolicyFile, server: SilProcess) -> None:
-    chosen = flies(policy, SLOW)
+def test_a_vehicle_that_levels_out_is_brought_down_safely(
+    policy: PolicyFile, server: SilProcess, furnish: Furnish
+) -> None:
+    chosen = furnish(flies(policy, SLOW))
     with CrazyflieSource(server.uri, chosen, Options(operator=Script(), rehearse=True)) as source:
         vehicle, site = vehicle_of(source), source._site
         assert site is not None

@@ -8,7 +8,7 @@ import pytest
 from ivl import experiment
 from ivl.errors import RolloutError
 from ivl.experiment import Experiment
-from ivl.links import crazyflie
+from ivl.links import recovery
 from ivl.links import vehicle as vehicles
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.options import Options
@@ -34,7 +34,7 @@ def test_policy_is_not_flown_when_the_vehicle_echoes_another(
             return Packet(packet.type, {**packet.values, member: packet[member] + 1})
         return packet
 
-    monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 2)
+    monkeypatch.setattr(recovery, "ATTEMPTS_MAX", 2)
     said: list[str] = []
     with CrazyflieSource(server.uri, vertical, Options(say=said.append)) as source:
         monkeypatch.setattr(vehicles, "decode", other)
@@ -60,7 +60,7 @@ def test_policy_out_of_range_is_discarded_and_not_flown(server: SilProcess, vert
 def test_outcome_of_another_policy_is_not_scored(
     server: SilProcess, vertical: Experiment, plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 1)
+    monkeypatch.setattr(recovery, "ATTEMPTS_MAX", 1)
     with CrazyflieSource(server.uri, vertical) as source:
         confirm = vehicles.Vehicle.confirm_policy
         monkeypatch.setattr(vehicles.Vehicle, "confirm_policy", lambda self: confirm(self) + 1)
@@ -72,7 +72,7 @@ def test_outcome_of_another_policy_is_not_scored(
 def test_outcome_that_does_not_belong_to_what_was_asked_is_not_scored(
     server: SilProcess, vertical: Experiment, plan: Plan, monkeypatch: pytest.MonkeyPatch, damage: str
 ) -> None:
-    monkeypatch.setattr(crazyflie, "ATTEMPTS_MAX", 1)
+    monkeypatch.setattr(recovery, "ATTEMPTS_MAX", 1)
     said: list[str] = []
     with CrazyflieSource(server.uri, vertical, Options(say=said.append)) as source:
         read = Session.read_memory

@@ -117,7 +117,7 @@ def test_fly_prints_snapshot_and_outcome_and_writes_the_recorder(
     [
         (["doctor", "--uri", "radio://0/80/2M/E7E7E7E7E7"], 1, "no Crazyradio is plugged in"),
         (["fly", "--uri", "udp://127.0.0.1:9", "--rrev", "4", "--moment", "8"], 1, "nobody listens there"),
-        (["learn", "experiments/paper_vertical.yaml", "--uri", "radio://0/80/2M/E7E7E7E7E7"], 1, "no Crazyradio"),
+        (["learn", "experiments/paper_vertical.yaml", "--uri", "radio://0/80/2M/E7E7E7E7E7"], 2, "ivl site new"),
         (["doctor", "--uri", "http://x"], 2, "names no link"),
         (["doctor", "--uri", "serial://nowhere"], 1, "there is no such serial port"),
     ],

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 
 from ivl import experiment
-from ivl.errors import RolloutError
+from ivl.check import Check
+from ivl.errors import ConfigError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import crazyflie, preflight, sil, sites
 from ivl.links.clock import FINE, Clock, LockStep
 from ivl.links.crazyflie import CrazyflieSource
-from ivl.links.landing_flight import FlyingEnds, Landing, Outcome, Point, Rollout, safe_or_why, start_point
+from ivl.links.landing_flight import FlyingEnds, Landing, Outcome, Rollout, safe_or_why
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Recording
+from ivl.links.recovery import Attempts, Recovery
 from ivl.links.sites.base import Visit, give_back_time
 from ivl.links.sites.rehearsal import Rehearsal
 from ivl.links.sites.room import Room
@@ -24,14 +26,19 @@ from ivl.links.sites.simulator import Simulator
 from ivl.links.tables import Session
 from ivl.links.truth import outcome_of_flight, suggest_legs
 from ivl.links.vehicle import Vehicle
+from ivl.mocap import config as mocap_config
 from ivl.silproc import SilProcess
+from ivl.site.file import SiteFile
 from ivl.source import Plan
+from ivl.startpoint import Point, start_point
 
 GOOD = (4.8, 8.0)
 
 
 class Hall:
     """A site of these tests: the software vehicle comes by air, nobody is asked, and its own recorder judges."""
+
+    contact_is_seen, battery_is_flown = False, False
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         self._vehicle, self._visit = vehicle, visit
@@ -43,6 +50,10 @@ class Hall:
         return sil.is_sil(session) and not options.rehearse
 
     @staticmethod
+    def recovery(session: Session, options: Options) -> Recovery:
+        return Attempts(session.uri, options.say)
+
+    @staticmethod
     def make_clock(session: Session, visit: Visit) -> Clock:
         del visit
         return LockStep(session, FINE)
@@ -51,7 +62,7 @@ class Hall:
         self.calls.append("again" if again else "ready")
         sil.reset(self._vehicle)
 
-    def checks(self) -> Iterator[preflight.Check]:
+    def checks(self) -> Iterator[Check]:
         yield preflight.tables(self._vehicle)
 
     def prove(self, fly: Callable[[Rollout], Outcome]) -> None:
@@ -65,6 +76,7 @@ class Hall:
 
     def to_start(self, rollout: Rollout) -> Point:
         del rollout
+        self._vehicle.has_begun = True
         self.calls.append("start")
         sil.reset(self._vehicle)
         self._vehicle.go_to(self._start_W_m, 3.0)
@@ -82,6 +94,9 @@ class Hall:
         resting = sites.room.resting_by_estimate(vehicle, recording)
         legs = suggest_legs(resting, world)
         return outcome_of_flight(recording, vehicle.snapshot(), legs, False, resting, world), recording
+
+    def end_flight(self) -> None:
+        pass
 
     def told(self, landing: Landing) -> str:
         return f"hall: {int(landing.outcome['n_legs'][0])} legs"
@@ -186,3 +201,33 @@ def test_a_site_is_one_file_and_one_row() -> None:
 def test_the_source_does_not_know_what_kinds_of_sites_there_are() -> None:
     text = Path(crazyflie.__file__).read_text(encoding="utf-8")
     assert re.findall(r"is_sil|rehears|simulator|[Rr]oom|operators|isinstance|links import .*\bsil\b", text) == []
+
+
+class Elsewhere:
+    """What a room is told of a vehicle that is no software vehicle, whatever its link."""
+
+    def __init__(self) -> None:
+        self.session = Connected(software=False)
+        self.session.uri = "tcp://10.0.0.1:5000"  # type: ignore[attr-defined]
+
+
+def test_a_drone_behind_any_link_needs_a_room_that_is_measured_and_tracked(
+    vertical: Experiment, in_room: Experiment
+) -> None:
+    site = Options().site_of(in_room, "tcp://10.0.0.1:5000")
+    assert site is not None
+    camera = mocap_config.load("vicon")
+
+    def enter(chosen: Experiment, place: SiteFile | None, **options: bool) -> Room:
+        visit = Visit(chosen, chosen.make_world(), Options(**options), place, None, print)
+        return Room(Elsewhere(), visit)  # type: ignore[arg-type]
+
+    assert enter(in_room, site)
+    for place, options, told in (
+        (None, {}, "flies only in a room that is described"),
+        (site, {"rehearse": True}, "leads to no software vehicle"),
+        (site.model_copy(update={"not_measured": ["home_m"]}), {}, "not measured yet: home_m"),
+        (site.model_copy(update={"mocap": camera}), {}, "track it as its site says"),
+    ):
+        with pytest.raises(ConfigError, match=told):
+            enter(in_room if place else vertical, place, **options)

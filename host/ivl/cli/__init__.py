@@ -32,6 +32,8 @@ from ivl.cli import (
     report,
     rollout,
     sil,
+    site,
+    stop,
     sweep,
 )
 from ivl.errors import ArgumentError, ConfigError, IvlError, LearnerError
@@ -78,6 +80,8 @@ app.command("can-gateway", help=can_gateway.HELP, short_help="Carry the link of 
     can_gateway.can_gateway
 )
 app.command("flash", help=flash.HELP)(flash.flash)
+app.command("stop", help=stop.HELP, short_help="Stop a vehicle that flies now.")(stop.stop)
+app.add_typer(site.app, name="site", short_help="Describe the room in which a drone flies.")
 app.add_typer(family.app, name="family", short_help="Show the vehicles that a task may be flown with.")
 app.add_typer(policy.app, name="policy", short_help="Learn, show and judge policies for every approach.")
 app.add_typer(flight.app, name="flight", short_help="Import, replay, compare and identify recorded flights.")

@@ -5,13 +5,15 @@ Both consoles print text as it is: no path, name or message of a user is markup.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
+from ivl.check import Check
 from ivl.forms import Form
 from ivl.learning.loop import Progress
 
@@ -32,6 +34,17 @@ def say(text: str) -> None:
 def print_json(data: dict[str, Any]) -> None:
     """Print one JSON object on stdout, plain text whatever the terminal."""
     print(json.dumps(data, allow_nan=False))
+
+
+def print_checks(found: Iterable[Check]) -> None:
+    """A table of checks on stdout: PASS or FAIL, and what to do about what fails."""
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "check", "found", "needed", "what to do"):
+        table.add_column(title, overflow="fold")
+    for check in found:
+        mark = Text("PASS", "green") if check.ok else Text("FAIL", "bold red")
+        table.add_row(mark, check.name, check.found, check.needed, "" if check.ok else check.remedy)
+    out.print(table, soft_wrap=False)
 
 
 def print_episode(progress: Progress, form: Form) -> None:

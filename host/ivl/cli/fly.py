@@ -7,17 +7,17 @@ import numpy as np
 import typer
 
 from ivl import experiment, files, outcome
-from ivl.cli import console, policy_options
+from ivl.cli import console, policy_options, site_options
 from ivl.cli.task_options import FLAGS
 from ivl.errors import ConfigError, LinkError
 from ivl.experiment import Experiment
 from ivl.links import pil
 from ivl.links.options import Options
-from ivl.mocap import config as mocap_config
 from ivl.policy import use
 from ivl.policy.file import PolicyFile
 from ivl.rewards import TOTAL, RewardChoice
 from ivl.settings import parse_setting
+from ivl.site import require
 from ivl.source import Plan
 from ivl.task import Task
 
@@ -33,10 +33,10 @@ and asks the operator for the outcome; a software vehicle is reset into the air 
 Examples:
   ivl fly --uri udp://127.0.0.1:19850 --rrev 4.8 --moment 8
       one landing of the software vehicle (docs/SIL.md starts one)
-  ivl fly --uri udp://127.0.0.1:19850 --rrev 4.8 --moment 8 --rehearse
-      the same as if it were a drone: every question, take-off and all
-  ivl fly --uri radio://0/80/2M/E7E7E7E7E7 --rrev 4.8 --moment 8 --csv landing.csv
-      the drone; the flight recorder goes into landing.csv
+  ivl fly --uri udp://127.0.0.1:19850 --rrev 4.8 --moment 8 --site lab.yaml --rehearse
+      the same as if it were a drone in the room of lab.yaml: every question, take-off and all
+  ivl fly --uri site --site lab.yaml --rrev 4.8 --moment 8 --csv landing.csv
+      the drone there; the flight recorder goes into landing.csv
   ivl fly --uri udp://127.0.0.1:19850 --policy g.yaml --speed 1.2 --angle 35
       a policy for every approach (ivl policy learn); its vehicle starts with: ivl sil --policy g.yaml
   ivl fly --uri pil:// --policy g.yaml --speed 1.2 --angle 35
@@ -46,7 +46,7 @@ Examples:
 
 def fly(
     uri: Annotated[
-        str, typer.Option(help="Link of the vehicle: radio://, usb://, udp://, tcp:// or serial://; or pil://.")
+        str, typer.Option(help="Link of the vehicle: radio://, usb://, udp://, tcp:// or serial://; pil://; or site.")
     ],
     rrev: policy_options.Rrev = None,
     moment: policy_options.Moment = None,
@@ -64,15 +64,18 @@ def fly(
     mocap: Annotated[
         str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
     ] = None,
+    site: site_options.Site = None,
     rehearse: Annotated[bool, typer.Option("--rehearse", help="Fly a software vehicle as a drone.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Fly one landing; HELP is the text that people see."""
     learned = policy_options.load(policy_file, theta=theta, rrev=rrev, moment=moment)
-    chosen = _experiment(learned, path, settings or [], speed_mps=speed, angle_deg=angle)
+    chosen = _experiment(learned, path, settings or [], speed_mps=speed, angle_deg=angle, site=site)
+    uri = require.link_of(chosen, uri) or uri
     values = learned.values if learned else policy_options.theta_of(chosen.policy.form, theta, rrev, moment)
     if uri.startswith("pil://"):
         _refuse(uri, {"--csv": csv, "--mocap": mocap, "--rehearse": rehearse or None})
+        _refuse(uri, {"--site": site})
         _print(*_fly_chip(uri, chosen, values, seed, stream), as_json)
         return
     try:
@@ -80,7 +83,8 @@ def fly(
         from ivl.links.landing_flight import Rollout
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
-    tracker = mocap_config.load(mocap) if mocap else None
+    require.for_flight(chosen, uri, rehearse)
+    tracker = site_options.tracker(chosen, uri, mocap, rehearse)
     # one landing is also of interest in another world; the vehicle's site warns of it
     options = Options(
         mocap=tracker, rehearse=rehearse, other_world=True, keep_recordings=csv is not None, say=console.say
@@ -95,19 +99,19 @@ def fly(
 
 
 def _experiment(
-    learned: PolicyFile | None, path: str | None, settings: list[str], **approach: float | None
+    learned: PolicyFile | None, path: str | None, settings: list[str], site: str | None, **approach: float | None
 ) -> Experiment:
     """What is flown: the experiment that is named, or what the policy was learned on, or the paper's approach."""
     if learned is None:
-        return experiment.load(path or _USUAL, settings, None, **approach)
+        return experiment.load(path or _USUAL, settings, None, site=site, **approach)
     if path is not None:
-        return experiment.load(path, settings, use.as_start(learned), **approach)
+        return experiment.load(path, settings, use.as_start(learned), site=site, **approach)
     said = {parse_setting(setting)[0] for setting in settings}
     for name, value in approach.items():
         if value is None and name not in said:
             raise ConfigError(f"{FLAGS[name][0]} is missing: a policy file says no approach")
     n_tasks = range(len(learned.tasks))
-    found = [experiment.load(_USUAL, settings, use.on_its_task(learned, i), **approach) for i in n_tasks]
+    found = [experiment.load(_USUAL, settings, use.on_its_task(learned, i), site=site, **approach) for i in n_tasks]
     use.the_one([each.task() for each in found])
     return found[0]
 

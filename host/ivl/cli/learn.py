@@ -3,17 +3,20 @@
 import shlex
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ivl import experiment, margin, run
-from ivl.cli import console, policy_options
+from ivl import experiment, links, margin, run
+from ivl.cli import console, policy_options, site_options
 from ivl.errors import ConfigError, IvlError
 from ivl.experiment import Experiment
 from ivl.links.options import Options
-from ivl.mocap import config as mocap_config
 from ivl.policy import use
+from ivl.site import require
+
+if TYPE_CHECKING:
+    from ivl.links.operators import Operator
 
 HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
 
@@ -41,8 +44,10 @@ Examples:
   ivl learn experiments/paper_vertical.yaml --uri udp://127.0.0.1:19850
       the whole stack, over the protocol of the drone: a software vehicle, started with
       ivl sil --experiment experiments/paper_vertical.yaml
-  ivl learn experiments/paper_vertical.yaml --uri radio://0/80/2M/E7E7E7E7E7 --mocap lab.yaml
-      the drone, tracked; see docs/HARDWARE.md and docs/HOST.md first
+  ivl learn experiments/paper_flight.yaml --site lab.yaml --rehearse
+      a day in the room of lab.yaml (ivl site new), with a software vehicle as if it were a drone
+  ivl learn experiments/paper_flight.yaml --site lab.yaml --uri site
+      the drone there; see docs/HARDWARE.md, docs/SITE.md and docs/HOST.md first
   ivl learn experiments/paper_vertical.yaml --policy g.yaml
       the search begins at the numbers of a policy for every approach
   ivl learn experiments/paper_flight.yaml --from runs/monday --from runs/tuesday
@@ -77,10 +82,17 @@ def learn(
     resume: Annotated[bool, typer.Option("--resume", help="Continue a run that was cut off.")] = False,
     uri: Annotated[
         str | None,
-        typer.Option(help="Where to fly: a vehicle's link, or pil:// (emulated STM32); default: simulator."),
+        typer.Option(help="Where to fly: a vehicle's link, site (that of --site), or pil://; default: simulator."),
     ] = None,
+    site: site_options.Site = None,
+    rehearse: Annotated[
+        bool, typer.Option("--rehearse", help="Fly a software vehicle as a drone; without --uri it is started.")
+    ] = False,
     mocap: Annotated[
         str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
+    ] = None,
+    answers: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Answers of a rehearsal's operator, one a line.")
     ] = None,
     other_world: Annotated[
         bool, typer.Option("--other-world", help="Also fly a software vehicle that simulates another world.")
@@ -89,20 +101,27 @@ def learn(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
 ) -> None:
     """Learn to land; HELP is the text that people see."""
-    chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume)
+    chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume, site)
+    uri = require.link_of(chosen, uri) or (f"{links.REHEARSAL_SCHEME}://" if rehearse else None)
+    if uri is not None:
+        require.for_flight(chosen, uri, rehearse)
     folder = out or run.default_folder(chosen, n_trials, resume)
     hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage, _bank, _drone, _note)
     flight = Options(
-        mocap=mocap_config.load(mocap) if mocap else None,
+        mocap=site_options.tracker(chosen, uri, mocap, rehearse),
+        rehearse=rehearse,
+        operator=_operator(answers, rehearse),
         other_world=other_world,
-        start_hint=_start_hint(path or str(folder / "config.yaml"), settings or [], uri or ""),
+        start_hint=_start_hint(path or str(folder / "config.yaml"), _said(settings, site), uri or ""),
         say=console.say,
     )
     try:
         result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight, earlier or [])
     except KeyboardInterrupt:
         words = ["ivl", "learn", "--resume", "--out", str(folder)]
-        words += [*(("--uri", uri) if uri else ()), *(("--mocap", mocap) if mocap else ())]
+        words += ["--uri", uri] if uri and not uri.startswith(links.REHEARSAL_SCHEME) else []
+        words += ["--mocap", mocap] if mocap else []
+        words += ["--rehearse"] if rehearse else []
         console.say(f"interrupted; continue with: {shlex.join([*words, *(['--other-world'] if other_world else [])])}")
         raise
     pictures, failure = _draw(result) if n_trials is None else ([], None)
@@ -114,6 +133,26 @@ def learn(
         raise failure
 
 
+def _operator(answers: Path | None, rehearse: bool) -> "Operator | None":
+    """The operator of a rehearsal whose answers are in a file; None: asked at the terminal.
+
+    Raises:
+        ConfigError: It is no rehearsal, or the file cannot be read.
+    """
+    if answers is None:
+        return None
+    if not rehearse:
+        raise ConfigError(f"--answers {answers}: only a rehearsal (--rehearse) is answered from a file")
+    from ivl.links.operators import ConsoleOperator, answers_of  # its modules load cflib
+
+    return ConsoleOperator(countdown_s=0, read=answers_of(answers))
+
+
+def _said(settings: list[str] | None, site: str | None) -> list[str]:
+    """What was set on the command line, as `--set` says it."""
+    return [*(settings or []), *([f"site={site}"] if site else [])]
+
+
 def _start_hint(path: str, settings: list[str], uri: str) -> str:
     """Command that starts a software vehicle in the experiment's world."""
     words = ["ivl", "sil", "--experiment", path, *(word for text in settings for word in ("--set", text))]
@@ -123,21 +162,21 @@ def _start_hint(path: str, settings: list[str], uri: str) -> str:
 
 def _choose(
     path: str | None, seed: int | None, trials: int | None, learner: str | None, settings: list[str],
-    policy_file: Path | None, out: Path | None, resume: bool,
+    policy_file: Path | None, out: Path | None, resume: bool, site: str | None,
 ) -> tuple[Experiment, int | None]:  # fmt: skip
     """The experiment of the arguments, or the one that the folder to resume holds."""
     if path is not None:
         learned = policy_options.load(policy_file)
         change = use.as_start(learned) if learned is not None else None
-        return experiment.load(path, settings, change, seed=seed, learner=learner), trials
+        return experiment.load(path, settings, change, seed=seed, learner=learner, site=site), trials
     if not (resume and out):
         raise ConfigError(
             "EXPERIMENT is missing (only `--resume --out FOLDER` goes without); see: ivl list experiments"
         )
-    if settings or learner or policy_file or seed is not None or trials is not None:
+    if settings or learner or policy_file or site or seed is not None or trials is not None:
         raise ConfigError(
             "--resume without EXPERIMENT takes all from the run folder: "
-            "leave out --set, --learner, --policy, --seed and --trials"
+            "leave out --set, --learner, --policy, --site, --seed and --trials"
         )
     return run.read_config(out)
 

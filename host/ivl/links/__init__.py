@@ -13,6 +13,8 @@ from ivl.source import RolloutSource
 
 VEHICLE_SCHEMES = ("udp", "radio", "usb", "tcp", "serial")
 """Links to a vehicle, a real or a software one."""
+REHEARSAL_SCHEME = "rehearsal"
+"""A software vehicle of its own, flown as a drone."""
 
 
 def open_source(
@@ -25,7 +27,7 @@ def open_source(
     """The source that a URI names.
 
     Args:
-        uri: pil://, or a link to a vehicle.
+        uri: pil://, rehearsal://, or a link to a vehicle.
         experiment: What is flown.
         threads: Worker threads; for pil://.
         options: How a vehicle is flown.
@@ -39,14 +41,15 @@ def open_source(
     scheme, separator, _ = uri.partition("://")
     if separator and scheme == "pil":
         return pil.PilSource(uri, experiment, threads, record)
-    if not separator or scheme not in VEHICLE_SCHEMES:
-        allowed = ", ".join(f"{name}://" for name in ("pil", *VEHICLE_SCHEMES))
+    if not separator or scheme not in (*VEHICLE_SCHEMES, REHEARSAL_SCHEME):
+        allowed = ", ".join(f"{name}://" for name in ("pil", *VEHICLE_SCHEMES, REHEARSAL_SCHEME))
         raise ConfigError(f"uri: value {uri!r} is unknown (allowed {allowed})")
     try:
-        from ivl.links import crazyflie  # cflib takes most of a second to load
+        from ivl.links import crazyflie, rehearsal  # cflib takes most of a second to load
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
     options = options or Options()
-    return crazyflie.CrazyflieSource(
-        uri, experiment, replace(options, keep_recordings=record or options.keep_recordings)
-    )
+    kept = replace(options, keep_recordings=record or options.keep_recordings)
+    if scheme == REHEARSAL_SCHEME:
+        return rehearsal.RehearsalSource(experiment, kept)
+    return crazyflie.CrazyflieSource(uri, experiment, kept)

@@ -8,7 +8,9 @@ All that depends on where is flown is the business of a site (`ivl.links.sites`)
 """
 
 import time
+from collections import Counter
 from collections.abc import Iterator
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -23,20 +25,24 @@ from ivl.links.journal import Journal
 from ivl.links.landing_flight import FlyingEnds, Landing, LandingFlight, Rollout
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Request
+from ivl.links.recovery import Recovery
 from ivl.links.sites import site_for
 from ivl.links.sites.base import Site, Visit, give_back_time
 from ivl.links.tables import Session
 from ivl.links.tracking import Tracking
-from ivl.links.vehicle import Command, OtherForms, PolicyRefused, Vehicle
+from ivl.links.trouble import Cause, Trouble, Vetoed, before_flight, cause_of, of_checks
+from ivl.links.vehicle import Command, OtherForms, PolicyRefused, Supervisor, Vehicle
+from ivl.mocap.frame import FlightFrame
 from ivl.outcome import Outcomes, valid
 from ivl.source import Flown, Plan
 
-ATTEMPTS_MAX = 10
 _AGAIN_S, _IDLE_S = 0.2, 3.0
 
 
 class VehicleAway(FlyingEnds):
     """The vehicle was lost and did not come back in time; the run can be resumed."""
+
+    cause = Cause.LOST
 
 
 class CrazyflieSource:
@@ -46,23 +52,30 @@ class CrazyflieSource:
         """Connect, check and configure the vehicle.
 
         Raises:
-            ConfigError: The URI is none, or the approach does not fit under the ceiling.
+            ConfigError: The URI is none, a drone has no site that is fit to fly in, or the approach does not fit
+                under the ceiling.
             LinkError: The vehicle cannot be reached.
             RolloutError: It must not fly as it is; the message says why and what to do.
             OtherForms: It does not have the form of the experiment's policy.
         """
         check_uri(uri)
         self.uri, self._experiment, self.options = uri, experiment, options or Options()
+        self._site_file = self.options.site_of(experiment, uri)
         self.world = experiment.make_world()
         self._vehicle: Vehicle | None = None
         self._site: Site | None = None
         self._tracking: Tracking | None = None
         self.n_discarded = 0
         """Flights that were not scored and were flown again."""
+        self.troubles: Counter[Cause] = Counter()
+        """Flights that did not count, by cause."""
+        self.refusals: Counter[Cause] = Counter()
+        """Flights that did not begin, by cause; they are no attempts."""
+        self._recovery: Recovery | None = None  # known when the kind of the site is
         self.warnings: list[str] = []
         """What a reader of the results has to know."""
         self._journal: Journal | None = None  # its folder may not be there before the first flight that counts
-        site = self._connect()
+        site = self._begin()
         try:
             site.prove(lambda rollout: self._fly_until_known(np.zeros(1, dtype=np.intp), rollout).outcomes)
         except BaseException:
@@ -70,6 +83,20 @@ class CrazyflieSource:
             raise
         if self.options.folder is not None:
             self._journal = Journal(self.options.folder, experiment.policy.shape)
+
+    def _begin(self) -> Site:
+        """Connect for the first time; what a person can mend is asked for, if there is one."""
+        while True:
+            try:
+                return self._connect()
+            except (FlyingEnds, OtherForms):
+                raise
+            except RolloutError as error:
+                if self._recovery is None:
+                    raise
+                found = before_flight(error)
+                self.refusals[cause_of(found)] += 1
+                self._recovery.before(found)
 
     def _warn(self, text: str) -> None:
         if text not in self.warnings:
@@ -82,7 +109,7 @@ class CrazyflieSource:
         """Fly every row of the plan, one after the other; each is handed over as soon as it is known.
 
         Raises:
-            RolloutError: A rollout was discarded ten times, the vehicle stayed away, or the operator stopped.
+            RolloutError: The site gives up, or its operator stopped.
         """
         for i in range(len(plan.theta)):
             rollout = Rollout(tuple(plan.theta[i].tolist()), int(plan.seed[i]), int(plan.stream[i]))
@@ -90,6 +117,9 @@ class CrazyflieSource:
 
     def close(self) -> None:
         """Bring the vehicle down, disarm it and close the link; safe to call at any time, and again."""
+        told = self._recovery.told(self.troubles) if self._recovery is not None else ""
+        if told:
+            self._warn(told)
         vehicle, site = self._vehicle, self._site
         if vehicle is None or site is None:
             return
@@ -117,7 +147,7 @@ class CrazyflieSource:
         return LandingFlight(vehicle, self._experiment).fly(site, rollout)
 
     def _fly_until_known(self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout) -> Flown:
-        for attempt in range(1, ATTEMPTS_MAX + 1):
+        for n in count(1):
             try:
                 if self._vehicle is None:
                     self._return()
@@ -128,21 +158,41 @@ class CrazyflieSource:
                 reason = "" if good else f"simulation: {self.world.end_reason(int(outcome['end_reason'][0]))}"
                 return Flown(index, outcome, reason, self._features(landing))
             except PolicyRefused as error:
-                self._note(rollout, f"refused: {error}")
-                if self._site is not None:
-                    self._site.after_refusal()
-                return Flown(index, _refused(), f"vehicle: {error}")
+                return self._without_flight(index, rollout, "refused", f"vehicle: {error}")
+            except Vetoed as error:
+                return self._without_flight(index, rollout, "vetoed", str(error))
+            except VehicleAway as error:
+                self._meet(rollout, error, n)
             except (FlyingEnds, OtherForms):
                 raise
             except LinkError as error:
-                self._discard(rollout, attempt, error)
+                told = self._note_trouble(rollout, error)
                 self._drop()
+                self._meet(rollout, told, n)
             except RolloutError as error:
-                self._discard(rollout, attempt, error)
+                told = self._note_trouble(rollout, error)
                 self._recover()
-        raise RolloutError(
-            f"{self.uri}: a rollout was discarded {ATTEMPTS_MAX} times in a row; the last reason is above"
-        )
+                self._meet(rollout, told, n)
+        raise AssertionError("count has no end")
+
+    def _without_flight(
+        self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout, what: str, why: str
+    ) -> Flown:
+        """A policy that is not flown, by the vehicle's will or the operator's: the next one is."""
+        self._note(rollout, f"{what}: {why}")
+        if self._site is not None:
+            self._site.after_refusal()
+        return Flown(index, _refused(), why)
+
+    def _meet(self, rollout: Rollout, error: Exception, n: int) -> None:
+        """Let the site's recovery decide, which may ask, and may raise."""
+        if self._recovery is None:
+            raise error
+        try:
+            self._recovery.after(error, n)
+        except FlyingEnds as end:
+            self._note(rollout, f"ended: {end}")
+            raise
 
     def _features(self, landing: Landing) -> np.ndarray[Any, np.dtype[np.float64]] | None:
         """What a landing recorded of its flip, shape (1, `ivl.belief.recording.N`); None without a recorder's rows."""
@@ -168,10 +218,15 @@ class CrazyflieSource:
         if self._journal is not None:
             self._journal.keep_recording(landing)
 
-    def _discard(self, rollout: Rollout, attempt: int, error: Exception) -> None:
+    def _note_trouble(self, rollout: Rollout, error: Exception) -> Exception:
+        """Count a flight that does not count, or one that did not begin, which is no attempt; what to meet."""
+        flew = self._vehicle is not None and self._vehicle.has_begun
+        found = error if flew else before_flight(error)
+        cause = cause_of(found)
+        (self.troubles if flew else self.refusals)[cause] += 1
         self.n_discarded += 1
-        self._note(rollout, f"discarded: {error}")
-        self.options.say(f"flight discarded, flown again (attempt {attempt} of {ATTEMPTS_MAX}): {error}")
+        self._note(rollout, f"{'discarded' if flew else 'not begun'}: {cause}: {error}")
+        return found
 
     def _note(self, rollout: Rollout, what: str, landing: Landing | None = None) -> None:
         if self._journal is not None:
@@ -191,9 +246,10 @@ class CrazyflieSource:
 
     def _open_site(self, session: Session, again: bool) -> Site:
         if self.options.mocap is not None:
-            self._tracking = Tracking(session, self.options.mocap)
-        visit = Visit(self._experiment, self.world, self.options, self._tracking, self._warn)
+            self._tracking = Tracking(session, self.options.mocap, self._frame())
+        visit = Visit(self._experiment, self.world, self.options, self._site_file, self._tracking, self._warn)
         kind = site_for(session, self.options)
+        self._recovery = self._recovery or kind.recovery(session, self.options)
         clock = kind.make_clock(session, visit)
         try:
             vehicle = Vehicle(session, clock)
@@ -205,12 +261,21 @@ class CrazyflieSource:
         self._vehicle, self._site = vehicle, site
         return site
 
+    def _frame(self) -> FlightFrame | None:
+        """The flight frame in the axes of the tracking system that the site names; another one has W itself."""
+        site, mocap = self._site_file, self.options.mocap
+        if site is None or mocap is None or mocap != site.mocap:
+            return None
+        return FlightFrame(site.surface.landing_point_m, site.heading_rad)
+
     def _prepare(self, vehicle: Vehicle, site: Site, again: bool) -> None:
         site.make_ready(again)
         found = [*site.checks(), preflight.policy_range(vehicle, self._experiment)]
-        problems = [preflight.failures(found), *(self._tracking.problems() if self._tracking else ())]
-        if any(problems):
-            raise RolloutError(f"{self.uri}: not fit to fly: {'; '.join(filter(None, problems))}")
+        if self._tracking is not None:
+            found += self._tracking.checks()
+        trouble = of_checks(found, Supervisor.LOCKED in vehicle.supervisor())
+        if trouble is not None:
+            raise Trouble(trouble.cause, f"{self.uri}: {trouble}")
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         vehicle.configure(self.world)
         if not again:  # on the ground: a vehicle with other forms is found out before it takes off

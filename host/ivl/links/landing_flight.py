@@ -12,26 +12,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ivl import native
-from ivl.errors import ConfigError, LinkError, RolloutError
+from ivl.errors import LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links.packets import Phase, Recording, Request
+from ivl.links.trouble import Trouble, of_rule
 from ivl.links.vehicle import Command, Snapshot, Vehicle
 from ivl.surface import Surface
-from ivl.world import World
 
 if TYPE_CHECKING:
     from ivl.links.sites.base import Site
 
-HEIGHT_M_MIN = 0.3
 _READY_S, _APPROACH_S, _IDLE_S = 5.0, 5.0, 3.0
 _AFTER_READY = (
     Phase.APPROACH, Phase.LEVEL_OUT, Phase.FLIP, Phase.COAST, Phase.ATTACHED, Phase.DONE, Phase.ABORTED,
 )  # fmt: skip
 _LEVEL_OUT_S, _LOOK_S, _STILL_M = 12.0, 0.25, 0.03
+_ASIDE_MPS, _LOW_M = 0.5, 0.15
 
 Outcome = np.ndarray[Any, np.dtype[np.void]]
-Point = tuple[float, float, float]
-"""x, y, z in W, m."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +81,14 @@ class LandingFlight:
             RolloutError: The landing must not be scored and can be flown again.
             LinkError: The same, and the link is gone.
         """
+        self.vehicle.begin_flight()
+        try:
+            return self._fly(site, rollout)
+        finally:
+            site.end_flight()
+
+    def _fly(self, site: "Site", rollout: Rollout) -> Landing:
         vehicle = self.vehicle
-        vehicle.begin_flight()
         start_W_m = site.to_start(rollout)
         battery_V = vehicle.battery_V
         vehicle.offer_policy(self._experiment.policy.shape, rollout.theta)
@@ -113,11 +117,11 @@ def check_abort(vehicle: Vehicle) -> None:
     Which rules are such reasons is a column of the flight core's table of rules.
     """
     if vehicle.aborted_by and vehicle.abort_reason:
-        raise RolloutError(f"aborted: {vehicle.abort_reason}")
+        raise Trouble(vehicle.abort_cause, f"aborted: {vehicle.abort_reason}")
     if vehicle.spoiled_by:
-        raise RolloutError(f"not to be scored: {vehicle.spoiled_by}")
+        raise Trouble(vehicle.abort_cause, f"not to be scored: {vehicle.spoiled_by}")
     if native.library().rules().get(vehicle.aborted_by, False):
-        raise RolloutError(f"the vehicle aborted: {vehicle.aborted_by}")
+        raise Trouble(of_rule(vehicle.aborted_by), f"the vehicle aborted: {vehicle.aborted_by}")
 
 
 @dataclass(frozen=True)
@@ -160,32 +164,11 @@ def end_level_out(vehicle: Vehicle, surface: Surface) -> LevelOut:
     return told
 
 
-def start_point(world: World, experiment: Experiment) -> Point:
-    """Where an approach has to begin so that full speed is held before the ceiling, and x = 0 is reached at it.
-
-    `start.room` can lower the start, not move it along x: an approach of shape `region` chooses its own direction.
-
-    Raises:
-        ConfigError: That is below the floor.
-    """
-    record, _ = world.native_model.config()
-    accel_mps2, h_ceil_m = float(record["ivl.approach_accel"][0]), float(record["ivl.h_ceil"][0])
-    hold_s = float(world.params.values["start.hold_time"])
-    speed_mps, angle_rad = experiment.speed_mps, math.radians(experiment.angle_deg)
-    path_m = 0.5 * speed_mps**2 / accel_mps2 + speed_mps * hold_s
-    drop_m = max(path_m * math.sin(angle_rad), float(world.params.values["start.room"]))
-    start = (-path_m * math.cos(angle_rad), 0.0, h_ceil_m - drop_m)
-    if start[2] < HEIGHT_M_MIN:
-        raise ConfigError(
-            f"speed_mps: value {speed_mps:g} m/s at {experiment.angle_deg:g} degrees needs {drop_m:.2f} m below a "
-            f"ceiling at {h_ceil_m:.2f} m: the start would be {start[2]:.2f} m above the floor (allowed from "
-            f"{HEIGHT_M_MIN} m)"
-        )
-    return start
-
-
-def make_safe(vehicle: Vehicle) -> str:
+def make_safe(vehicle: Vehicle, emergency_W_m: tuple[float, float] | None = None) -> str:
     """Bring a vehicle down and disarm it, whatever it does; returns what was done, in words.
+
+    Under another controller it lands at `emergency_W_m` (x, y in W, m), or where it is if there is no such place. Under
+    the core an abort brings it down where it is.
 
     After the trigger nothing is interrupted: half a flip is worse than a whole one.
 
@@ -205,6 +188,8 @@ def make_safe(vehicle: Vehicle) -> str:
             done.append("landed")
         elif vehicle.phase == Phase.IDLE and vehicle.is_flying():
             vehicle.command = Command(Request.IDLE)
+            if not _went_aside(vehicle, emergency_W_m):
+                done.append("could not fly to the emergency place")
             vehicle.land(0.0, 4.0)
             vehicle.wait(lambda: not vehicle.is_flying(), 20.0, "landing", 0.5)
             done.append("landed")
@@ -220,9 +205,25 @@ def make_safe(vehicle: Vehicle) -> str:
     return ", ".join(done)
 
 
-def safe_or_why(vehicle: Vehicle) -> str:
+def _went_aside(vehicle: Vehicle, place_W_m: tuple[float, float] | None) -> bool:
+    """Fly to a place, at the present height; false if the vehicle refuses, which must not keep it from landing."""
+    if place_W_m is None:
+        return True
+    x, y, z = vehicle.position_W_m
+    if not (math.isfinite(x) and z > _LOW_M):
+        return True  # it is down, or nobody knows where it is: it lands where it is
+    span_s = math.dist((x, y), place_W_m) / _ASIDE_MPS + 1.0
+    try:
+        vehicle.go_to((*place_W_m, z), span_s)
+    except RolloutError:
+        return False
+    vehicle.pause(span_s)
+    return True
+
+
+def safe_or_why(vehicle: Vehicle, emergency_W_m: tuple[float, float] | None = None) -> str:
     """`make_safe`, with a failure told as text: for the end of a run, which must go on."""
     try:
-        return make_safe(vehicle)
+        return make_safe(vehicle, emergency_W_m)
     except (LinkError, RolloutError) as error:
         return f"not confirmed: {error}"

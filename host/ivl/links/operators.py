@@ -1,18 +1,69 @@
-"""The person beside a real vehicle: what is asked, and how."""
+"""The person beside a real vehicle: what is asked, and how.
 
+Each question needs its word, and none has an answer by default. What was typed before a question appeared is dropped.
+Nobody is asked who does not sit at a terminal: a drone is never armed from a pipe.
+"""
+
+import sys
 import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from rich.console import Console
-from rich.prompt import Prompt
 
+from ivl.errors import ConfigError
+from ivl.forms import Form
 from ivl.links.landing_flight import FlyingEnds
+from ivl.links.trouble import Cause, Vetoed, state_of
 from ivl.links.truth import Resting
+
+STOP = "stop"
+_RESUME = "the run can be resumed"
 
 
 class OperatorStopped(FlyingEnds):
     """The operator wants no further flight; the run can be resumed."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What the simulator expects of a policy, from `n` landings with random numbers of its own."""
+
+    n: int
+    n_landed: int
+    n_strikes: int
+
+    def __str__(self) -> str:
+        """In one line; a strike does not land, and its body or rotors touch the ceiling."""
+        return (
+            f"simulated: {self.n_landed} of {self.n} land; risk: {self.n_strikes} of {self.n} strike the ceiling "
+            "with body or rotors"
+        )
+
+
+@dataclass(frozen=True)
+class Upcoming:
+    """The flight that is announced.
+
+    Attributes:
+        number: Of the rollout, from 1.
+        n_all: Rollouts that the budget pays for.
+        form: Form of the policy.
+        theta: Its parameters, in the units of the form.
+        forecast: What the simulator expects.
+        start_W_m: Where the vehicle will hover.
+        home_W_m: Where it must stand, along the floor.
+    """
+
+    number: int
+    n_all: int
+    form: Form
+    theta: tuple[float, ...]
+    forecast: Forecast
+    start_W_m: tuple[float, float, float]
+    home_W_m: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -33,12 +84,20 @@ class Seen:
 class Operator(Protocol):
     """Answers what only a person can. Each method may raise OperatorStopped."""
 
-    def place(self, start_W_m: tuple[float, float, float]) -> None:
-        """Return when the vehicle stands upright below the start point, and nobody is near."""
+    def place(self, upcoming: Upcoming) -> None:
+        """Return when the vehicle stands upright at home, nobody is near, and this flight may begin.
+
+        Raises:
+            Vetoed: It may not; the next policy is announced.
+        """
         ...
 
     def change_battery(self, battery_V: float, needed_V: float) -> None:
         """Return when the battery has been changed."""
+        ...
+
+    def help(self, cause: Cause, text: str) -> None:
+        """Return when what the state of this cause asks for has been done."""
         ...
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
@@ -46,52 +105,112 @@ class Operator(Protocol):
         ...
 
 
+def read_line() -> str:
+    """A line from the terminal, without what was typed before.
+
+    Raises:
+        OperatorStopped: Nobody sits there.
+    """
+    if not sys.stdin.isatty():
+        raise OperatorStopped(f"nobody answers: standard input is no terminal ({_RESUME})")
+    drop_typed()
+    line = sys.stdin.readline()
+    if not line:
+        raise OperatorStopped(f"the terminal was closed ({_RESUME})")
+    return line
+
+
+def answers_of(path: Path) -> Callable[[], str]:
+    """Answers from a file, one a line, in place of a terminal: for rehearsals.
+
+    Raises:
+        ConfigError: It cannot be read.
+    """
+    try:
+        lines = iter(path.read_text(encoding="utf-8").splitlines())
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"--answers {path}: cannot be read: {error}") from error
+
+    def read() -> str:
+        line = next(lines, None)
+        if line is None:
+            raise OperatorStopped(f"{path}: no answer is left ({_RESUME})")
+        return line
+
+    return read
+
+
+def drop_typed() -> None:
+    """Forget what was typed ahead of a question."""
+    import termios  # the package loads where there is none
+
+    termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
+
+
 class ConsoleOperator:
-    """Asks in the terminal; q stops, at any question."""
+    """Asks in the terminal; the word `stop` ends the day, at any question."""
 
-    def __init__(self, console: Console | None = None, countdown_s: int = 3) -> None:
-        """`console` is where is asked (default: the terminal's error stream, so that results can be piped)."""
-        self._console = console or Console(stderr=True)
-        self._countdown_s = countdown_s
+    def __init__(
+        self, console: Console | None = None, countdown_s: int = 3, read: Callable[[], str] = read_line
+    ) -> None:
+        """Ask on a console.
 
-    def _ask(self, text: str, choices: list[str], default: str) -> str:
-        try:
-            answer = Prompt.ask(text, console=self._console, choices=[*choices, "q"], default=default)
-        except EOFError as error:
-            raise OperatorStopped("nobody answers at the terminal: the run can be resumed") from error
-        if answer == "q":
-            raise OperatorStopped("stopped by the operator: the run can be resumed")
-        return answer
+        Args:
+            console: Where is asked; None: the terminal's error stream, so that results can be piped.
+            countdown_s: Seconds that are counted down before take-off.
+            read: Gives the next answer.
+        """
+        self._console = console or Console(stderr=True, markup=False, highlight=False, soft_wrap=True)
+        self._countdown_s, self._read = countdown_s, read
 
-    def place(self, start_W_m: tuple[float, float, float]) -> None:
-        """Ask, then count down."""
-        self._console.print(
-            "RESET: vehicle upright on the floor near ({:.2f}, {:.2f}) m; it will hover at {:.2f} m.".format(
-                *start_W_m
-            ),
-            highlight=False,
+    def _tell(self, text: str) -> None:
+        self._console.print(text)
+
+    def _ask(self, text: str, words: Iterable[str]) -> str:
+        """Ask until the answer is one of these words."""
+        allowed = [*words, STOP]
+        shown = " | ".join(allowed)
+        while True:
+            self._console.print(f"{text} [{shown}]: ", end="")
+            answer = " ".join(self._read().split())
+            if answer == STOP:
+                raise OperatorStopped(f"stopped by the operator ({_RESUME})")
+            if answer in allowed:
+                return answer
+            self._tell(f"not understood: {answer!r}; type one of the words in brackets")
+
+    def place(self, upcoming: Upcoming) -> None:
+        """Show the flight, ask, then count down."""
+        theta = upcoming.form.describe(upcoming.theta)
+        self._tell(f"NEXT: rollout {upcoming.number} of {upcoming.n_all}: {theta}; {upcoming.forecast}.")
+        self._tell(
+            "Vehicle upright at home ({:.2f}, {:.2f}) m; ".format(*upcoming.home_W_m)
+            + "it will hover at ({:.2f}, {:.2f}, {:.2f}) m. Everybody outside, net closed.".format(*upcoming.start_W_m)
         )
-        self._ask("CLEAR? everybody outside, net closed: y to arm and fly", ["y"], "y")
+        word = f"fly {upcoming.number}"
+        if self._ask("arm and fly?", [word, "veto"]) == "veto":
+            raise Vetoed("vetoed by the operator")
         for left_s in range(self._countdown_s, 0, -1):
-            self._console.print(f"\atake-off in {left_s} (Ctrl-C stops)", highlight=False)
+            self._tell(f"\atake-off in {left_s} (any key stops)")
             time.sleep(1.0)
 
     def change_battery(self, battery_V: float, needed_V: float) -> None:
         """Ask."""
-        self._console.print(
-            f"BATTERY {battery_V:.2f} V, needed {needed_V:.2f} V: change it; the same policy is flown next.",
-            style="bold",
-        )
-        self._ask("y when it is changed and the vehicle is on", ["y"], "y")
+        self._tell(f"BATTERY: {battery_V:.2f} V, needed {needed_V:.2f} V; the same policy is next.")
+        self._ask(f"{state_of(Cause.BATTERY).asks}, then", ["changed"])
+
+    def help(self, cause: Cause, text: str) -> None:
+        """Tell, and ask."""
+        state = state_of(cause)
+        self._tell(f"{cause.upper()}: {text}")
+        self._ask(f"{state.asks}, then", ["go on"])
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
-        """Ask for legs and body contact, with what the pose suggests as default."""
+        """Ask for legs and body contact; what the pose suggests is shown."""
         pose = f"rests at {resting.p_W_m[2]:.3f} m, {'hanging' if resting.up_W[2] < 0 else 'upright'}"
-        self._console.print(f"OUTCOME: {note or 'landing over'}; {pose}.", highlight=False)
-        answer = self._ask(
-            "legs that hold (d: discard, fly it again)", ["4", "3", "2", "1", "0", "d"], str(suggested.n_legs)
-        )
-        if answer == "d":
+        self._tell(f"OUTCOME: {note or 'landing over'}; {pose}; it looks like {suggested.n_legs} legs.")
+        answer = self._ask("legs that hold", ["4", "3", "2", "1", "0", "discard"])
+        if answer == "discard":
             return Seen(0, False, discard=True)
-        body = self._ask("did body or rotors touch the ceiling?", ["y", "n"], "y" if suggested.body_contact else "n")
-        return Seen(int(answer), body == "y")
+        body = self._ask("body or rotors at the ceiling", ["touched", "clean"])
+        return Seen(int(answer), body == "touched")

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ivl.experiment import Experiment
 from ivl.links.deadlines import DEADLINES, Deadlines
 from ivl.mocap.config import MocapConfig
+from ivl.site import require
+from ivl.site.file import SiteFile
 
 if TYPE_CHECKING:
     from ivl.links.operators import Operator
@@ -43,3 +46,7 @@ class Options:
     keep_recordings: bool = False
     say: Callable[[str], None] = silent
     deadlines: Deadlines = DEADLINES
+
+    def site_of(self, experiment: Experiment, uri: str) -> SiteFile | None:
+        """The site file that a flight of an experiment is flown with (as `ivl.site.require.for_flight`)."""
+        return require.for_flight(experiment, uri, self.rehearse)

@@ -6,14 +6,13 @@ says so. A check never changes what the vehicle does.
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ivl import native
+from ivl.check import Check
 from ivl.experiment import Experiment, Policy
 from ivl.links import sil
 from ivl.links.packets import Phase
@@ -28,48 +27,30 @@ _CONTROLLER_APP = 6
 _CORNER_DIMENSIONS_MAX = 8
 
 
-@dataclass(frozen=True)
-class Check:
-    """One line of the table.
-
-    Attributes:
-        name: What was looked at.
-        ok: Whether it is as it must be.
-        found: What was found.
-        needed: What is allowed.
-        remedy: What to do if it is not.
-    """
-
-    name: str
-    ok: bool
-    found: str
-    needed: str
-    remedy: str
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {"name": self.name, "ok": self.ok, "found": self.found, "needed": self.needed, "remedy": self.remedy}
-
-
-def checks(vehicle: Vehicle, experiment: Experiment | None = None) -> Iterator[Check]:
+def checks(
+    vehicle: Vehicle, experiment: Experiment | None = None, battery_V_min: float = BATTERY_V_MIN
+) -> Iterator[Check]:
     """Make the checks one by one, those of an experiment's ranges and configuration if it is given.
+
+    Args:
+        vehicle: Connected.
+        experiment: What is to be flown.
+        battery_V_min: Least rest voltage, V; that of the site, if it has one.
 
     Raises:
         LinkError: The link broke on the way.
         RolloutError: The vehicle refuses the configuration.
     """
-    for check in (tables, link, supervisor, controller, bypass, tumble_check, battery, estimator, phase):
+    for check in (tables, link, supervisor, controller, bypass, tumble_check):
+        yield check(vehicle)
+    yield battery(vehicle, battery_V_min)
+    for check in (estimator, phase):
         yield check(vehicle)
     if experiment is not None:
         yield policy_range(vehicle, experiment)
         yield configuration(vehicle, experiment)
         if sil.is_sil(vehicle.session):
             yield simulated_world(vehicle, experiment)
-
-
-def failures(found: list[Check]) -> str:
-    """The checks that failed, in one line; empty if none did."""
-    return "; ".join(f"{c.name}: {c.found} (needed: {c.needed}): {c.remedy}" for c in found if not c.ok)
 
 
 def tables(vehicle: Vehicle) -> Check:
@@ -133,11 +114,11 @@ def tumble_check(vehicle: Vehicle) -> Check:
     return _param(vehicle, "supervisor.tmblChckEn", 1, "restart the vehicle; if it stays, the app does not run")
 
 
-def battery(vehicle: Vehicle) -> Check:
+def battery(vehicle: Vehicle, least_V: float = BATTERY_V_MIN) -> Check:
     """Rest voltage."""
     vehicle.wait_in_wall_time(lambda: vehicle.battery_V > 0.0, BATTERY_S)
     return Check(
-        "battery", vehicle.battery_V >= BATTERY_V_MIN, f"{vehicle.battery_V:.2f} V", f"{BATTERY_V_MIN:.2f} V or more",
+        "battery", vehicle.battery_V >= least_V, f"{vehicle.battery_V:.2f} V", f"{least_V:.2f} V or more",
         "charge or change the battery",
     )  # fmt: skip
 

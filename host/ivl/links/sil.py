@@ -3,6 +3,7 @@
 The parameters are in group `sil`; a vehicle without it is flown as a drone is.
 """
 
+import math
 import struct
 import zlib
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ _HEADER = "<5L"
 _AS_FLOWN = 255
 _RESET_S, _SEEN_S, _ENDED_S = 2.0, 0.06, 70.0
 _LAND_S, _LANDED_S = 3.0, 15.0
+_CARRY_MPS, _THERE_M = 0.5, 0.05
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,20 @@ def differences(session: Session, world: World) -> list[str]:
     ]
 
 
-def put_on_floor(vehicle: Vehicle) -> None:
-    """What a person does with a drone that hangs or lies somewhere: it stands upright on the floor, motors off."""
+def put_on_floor(vehicle: Vehicle, place_W_m: tuple[float, float] | None = None) -> None:
+    """What a person does with a drone that hangs or lies somewhere: it stands upright on the floor, motors off.
+
+    Args:
+        vehicle: A software vehicle.
+        place_W_m: Where on the floor, m; None: below the point to which a reset puts it.
+    """
     reset(vehicle)
+    if place_W_m is not None and math.dist(vehicle.position_W_m[:2], place_W_m) > _THERE_M:
+        duration_s = math.dist(vehicle.position_W_m[:2], place_W_m) / _CARRY_MPS + 1.0
+        vehicle.go_to((*place_W_m, vehicle.position_W_m[2]), duration_s)
+        vehicle.pause(duration_s + _LAND_S)
     vehicle.land(0.0, _LAND_S)
+    vehicle.pause(_LAND_S)  # just after a reset its supervisor may not know yet that it flies
     vehicle.wait(lambda: not vehicle.is_flying(), _LANDED_S, "landing", 0.2)
 
 

@@ -3,10 +3,12 @@
 from contextlib import ExitStack
 from typing import Any
 
+from ivl.check import Check
 from ivl.links.tables import Session
 from ivl.links.truth import Resting
 from ivl.links.vehicle import Vehicle
 from ivl.mocap.config import MocapConfig
+from ivl.mocap.frame import FlightFrame
 from ivl.mocap.guard import LossGuard
 from ivl.mocap.simulated import SimulatedRoom
 from ivl.mocap.stream import Mocap
@@ -15,8 +17,8 @@ from ivl.mocap.stream import Mocap
 class Tracking:
     """A tracking system that follows the vehicle of a session."""
 
-    def __init__(self, session: Session, config: MocapConfig) -> None:
-        """Start it, and wait until the pose is good.
+    def __init__(self, session: Session, config: MocapConfig, frame: FlightFrame | None = None) -> None:
+        """Start it, and wait until the pose is good; `frame` is that of the flight.
 
         Raises:
             LinkError: It is not good in time; the message says why.
@@ -31,7 +33,7 @@ class Tracking:
                 session.write({"sil.pose_source": 1})
                 request = self.room.request(config)
             session.write({name: value for name, value in config.vehicle_params().items() if session.has_param(name)})
-            self.mocap = self._stack.enter_context(Mocap(config, session.cf.extpos, request))
+            self.mocap = self._stack.enter_context(Mocap(config, session.cf.extpos, request, frame))
             self.mocap.wait_until_good()
         except BaseException:
             self.close()
@@ -46,6 +48,11 @@ class Tracking:
     def problems(self) -> list[str]:
         """What speaks against a flight now, one line each."""
         return self.mocap.problems()
+
+    def checks(self) -> list[Check]:
+        """One check for each thing that speaks against a flight now."""
+        needed = "good, fast and steady enough"
+        return [Check("motion capture", False, text, needed, "see ivl mocap") for text in self.problems()]
 
     def resting(self) -> Resting | None:
         """Where the cameras see the vehicle; None if they do not."""

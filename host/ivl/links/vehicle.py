@@ -33,6 +33,7 @@ from ivl.links.packets import (
     encode_reading,
 )
 from ivl.links.tables import LogBlock, Session
+from ivl.links.trouble import Cause, Trouble
 from ivl.world import World
 
 UNHEARD_S_MAX = 0.4
@@ -43,7 +44,9 @@ _WALL_POLL_S = 0.005
 _LOGS_S = 3.0
 # what the vehicle refuses although it is in its range
 _REMEDY = {"ivl.motor_thrust_max": " of the motors that its image was made for (choose them: `make -C firmware`)"}
-_ABORT_S, _DOWN_S = 3.0, 60.0
+_ABORT_S, _DOWN_S, _STOP_LAND_S = 3.0, 60.0, 4.0
+_FLYING = (Request.HOVER, Request.APPROACH)
+_EMERGENCY_STOP = b"\x03"
 _ON_ITS_WAY = (Status.INCOMPLETE, Status.CRC)
 """What an echo says while the parts of a policy have not all come."""
 _WHOLE_MAX = 4
@@ -146,8 +149,15 @@ class Vehicle:
         self.command = Command(Request.IDLE)
         self.abort_reason = ""
         """Why `abort` was called; empty if it was not."""
+        self.abort_cause = Cause.TRACKING
+        """What the reason means: motion capture, unless whoever asked has said otherwise."""
         self.aborted_by = ""
         """Safety rule by which the vehicle aborted ("none": it was asked to); empty if it has not."""
+        self.stopped = ""
+        """Why nothing is flown any more over this connection; empty while it may be."""
+        self._motors_off = False
+        self.has_begun = False
+        """Whether this flight has left the floor, or was put into the air."""
         self.spoiled_by = ""
         """Why this flight must not be scored, however it ends; empty if there is no reason."""
         self._seq = secrets.randbits(16)
@@ -232,8 +242,9 @@ class Vehicle:
         """Send the present command once, and a policy that is not confirmed yet; returns the command's number."""
         self._seq = (self._seq + 1) % 0x10000
         c = self.command
+        request = Request.ABORT if self.stopped and c.request in _FLYING else c.request
         data = encode(
-            PacketType.COMMAND, seq=self._seq, request=c.request, hover_x_m=c.hover_W_m[0], hover_y_m=c.hover_W_m[1],
+            PacketType.COMMAND, seq=self._seq, request=request, hover_x_m=c.hover_W_m[0], hover_y_m=c.hover_W_m[1],
             hover_z_m=c.hover_W_m[2], speed_mps=c.speed_mps, angle_rad=c.angle_rad,
         )  # fmt: skip
         self.session.send(_PORT_PLATFORM, _APP, data)
@@ -249,16 +260,41 @@ class Vehicle:
         self.session.send(_PORT_PLATFORM, _APP, encode_reading(rrev_per_s, of_y_radps, age_s))
 
     def begin_flight(self) -> None:
-        """Forget how the last flight was aborted, or called off, and a policy that was never confirmed."""
+        """Forget how the last flight was aborted, or called off, and a policy that was never confirmed.
+
+        Raises:
+            Trouble: It was stopped; a new connection may fly again.
+        """
+        self.check_stop()
         self.abort_reason = self.aborted_by = self.spoiled_by = ""
+        self.abort_cause, self.has_begun = Cause.TRACKING, False
         self._n_no_go = int(self._decision.values.get("ivl.n_no_go", 0))
         self._offer = None
 
-    def abort(self, reason: str) -> None:
+    def abort(self, reason: str, cause: Cause = Cause.TRACKING) -> None:
         """Ask for an abort, once; before the trigger it is obeyed, later it changes nothing. From any thread."""
-        self.abort_reason = reason
+        self.abort_reason, self.abort_cause = reason, cause
         self.command = replace(self.command, request=Request.ABORT)
         self.send_command()
+
+    def stop(self, reason: str, motors_off: bool) -> None:
+        """From now on HOVER and APPROACH are an abort; to be followed by `send_stop`. From any thread."""
+        self.abort_reason, self.abort_cause, self._motors_off = reason, Cause.STOPPED, motors_off
+        self.stopped = reason
+
+    def send_stop(self) -> None:
+        """Send once what stops the vehicle, whoever controls it; nobody waits for an answer. From any thread."""
+        if self._motors_off:
+            self.session.send(_PORT_SUPERVISOR, 1, _EMERGENCY_STOP)
+        elif self.phase == Phase.IDLE and self.seems_to_fly:
+            self.session.send(_PORT_HL, 0, _land(0.0, _STOP_LAND_S))
+        self.send_command()
+
+    def check_stop(self) -> bool:
+        """Raise Trouble if it was stopped; false if not, so that it can stand before a condition that is waited for."""
+        if self.stopped:
+            raise Trouble(Cause.STOPPED, self.stopped)
+        return False
 
     def spoil(self, reason: str) -> None:
         """This flight must not be scored; the first reason is kept. From any thread."""
@@ -292,6 +328,8 @@ class Vehicle:
         return self.phase
 
     def _has_answered(self, first: int, phases: tuple[Phase, ...]) -> bool:
+        if self.command.request in _FLYING and self.phase not in phases:
+            self.check_stop()
         if not self._has_heard(first):
             return False
         if self._echo[PacketType.COMMAND_ECHO]["status"] == Status.RANGE:
@@ -450,6 +488,7 @@ class Vehicle:
 
     def take_off(self, height_m: float, duration_s: float) -> None:
         """Climb to a height, by the high-level commander; returns when the vehicle has taken the order."""
+        self.has_begun = True
         self._high_level(struct.pack("<BBff?f", 7, 0, height_m, 0.0, True, duration_s), "take-off")
 
     def go_to(self, position_W_m: tuple[float, float, float], duration_s: float) -> None:
@@ -460,7 +499,7 @@ class Vehicle:
 
     def land(self, height_m: float, duration_s: float) -> None:
         """Descend, by the high-level commander."""
-        self._high_level(struct.pack("<BBff?f", 8, 0, height_m, 0.0, True, duration_s), "landing")
+        self._high_level(_land(height_m, duration_s), "landing")
 
     def stop_planner(self) -> None:
         """Let the high-level commander ask for nothing any more: on the ground, or it takes off again."""
@@ -512,6 +551,11 @@ class Vehicle:
     def recording(self, policy_seq: int) -> Recording:
         """Download the flight recorder of the landing that flew a policy (errors as `recorder.download`)."""
         return recorder.download(self.session, policy_seq)
+
+
+def _land(height_m: float, duration_s: float) -> bytes:
+    """The high-level commander's order to descend."""
+    return struct.pack("<BBff?f", 8, 0, height_m, 0.0, True, duration_s)
 
 
 def _same(present: float, wanted: float) -> bool:

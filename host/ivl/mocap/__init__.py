@@ -2,6 +2,7 @@
 
 config     what a YAML file says: system, body, limits
 child      the process that talks to the tracking system
+frame      from the axes of the tracking system to the flight frame
 tracker    starts, reads and ends that process
 watch      whether poses are fresh and true: lost, frozen, jumping
 stream     all of it in a thread: poses to the vehicle, state to whoever asks

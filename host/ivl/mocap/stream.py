@@ -15,6 +15,7 @@ from typing import Any, Protocol, Self
 
 from ivl.errors import LinkError
 from ivl.mocap.config import MocapConfig
+from ivl.mocap.frame import FlightFrame
 from ivl.mocap.guard import Guard
 from ivl.mocap.tracker import Frame, Tracker, request_of
 from ivl.mocap.watch import Counts, Pose, Rates, Status, Watch, make_pose
@@ -74,7 +75,11 @@ class Mocap:
     """A thread that reads the tracking system and sends poses."""
 
     def __init__(
-        self, config: MocapConfig, sink: PoseSink | None = None, request: dict[str, Any] | None = None
+        self,
+        config: MocapConfig,
+        sink: PoseSink | None = None,
+        request: dict[str, Any] | None = None,
+        frame: FlightFrame | None = None,
     ) -> None:
         """Nothing runs until `start`.
 
@@ -82,6 +87,7 @@ class Mocap:
             config: Checked configuration.
             sink: Where poses go.
             request: What the process is told, if it does not follow from the configuration (system `simulator`).
+            frame: The flight frame in the axes of the tracking system; None: they are the same.
 
         Raises:
             LinkError: The computer of the tracking system cannot be found.
@@ -90,7 +96,7 @@ class Mocap:
         self.guard: Guard | None = None
         """Told of each state; set before a flight."""
         self._request = request if request is not None else request_of(config)
-        self._sink = sink
+        self._sink, self._frame = sink, frame or FlightFrame()
         self._watch = Watch(config)
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -205,6 +211,7 @@ class Mocap:
         self._bodies = tuple(frame.bodies)
         values = frame.bodies.get(self.config.body)
         pose = None if values is None else make_pose(values, self.config.up)
+        pose = None if pose is None else self._frame.into(pose)
         return self._watch.take(frame.t_s, pose, is_present=values is not None, in_flight=in_flight)
 
     def _send(self, t_s: float, pose: Pose) -> None:

@@ -9,16 +9,19 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from ivl.check import Check
 from ivl.errors import LinkError
 from ivl.experiment import Experiment
 from ivl.links.clock import Clock
-from ivl.links.landing_flight import Landing, Outcome, Point, Rollout
+from ivl.links.landing_flight import Landing, Outcome, Rollout
 from ivl.links.options import Options
 from ivl.links.packets import Recording
-from ivl.links.preflight import Check
+from ivl.links.recovery import Recovery
 from ivl.links.tables import Session
 from ivl.links.tracking import Tracking
 from ivl.links.vehicle import Vehicle
+from ivl.site.file import SiteFile
+from ivl.startpoint import Point
 from ivl.world import World
 
 
@@ -30,6 +33,7 @@ class Visit:
         experiment: What is flown.
         world: Its world here.
         options: How it is flown.
+        site_file: The room as measured; None: a simulator has none.
         tracking: Motion capture that follows the vehicle; None: there is none of ours.
         warn: Called with what a reader of the results has to know.
     """
@@ -37,6 +41,7 @@ class Visit:
     experiment: Experiment
     world: World
     options: Options
+    site_file: SiteFile | None
     tracking: Tracking | None
     warn: Callable[[str], None]
 
@@ -61,6 +66,11 @@ class Site(Protocol):
     @staticmethod
     def suits(session: Session, options: Options) -> bool:
         """Whether this is the site of a vehicle that is flown in this way."""
+        ...
+
+    @staticmethod
+    def recovery(session: Session, options: Options) -> Recovery:
+        """Who decides whether flying goes on after a flight that does not count; asked at the first connection."""
         ...
 
     @staticmethod
@@ -98,6 +108,10 @@ class Site(Protocol):
 
     def outcome(self, policy_seq: int) -> tuple[Outcome, Recording | None]:
         """Wait for the end of the landing and tell what came of it; the recording is stored, unless it is None."""
+        ...
+
+    def end_flight(self) -> None:
+        """The flight is over, however it ended; must not raise, and may come twice."""
         ...
 
     def told(self, landing: Landing) -> str:

@@ -2,6 +2,7 @@
 
 from ivl.links import sil
 from ivl.links.clock import FINE, Clock, LockStep, WallClock
+from ivl.links.landing_flight import Rollout
 from ivl.links.options import Options
 from ivl.links.sites.base import Visit
 from ivl.links.sites.room import Room
@@ -26,9 +27,9 @@ class Rehearsal(Room):
     def make_ready(self, again: bool) -> None:
         """Put it on the floor, whatever it does."""
         del again
-        sil.put_on_floor(self._vehicle)
+        sil.put_on_floor(self._vehicle, self._room.home_m)
 
-    def _place(self) -> None:
+    def _place(self, rollout: Rollout) -> None:
         """Ask the operator, and do what the operator's hands do with a drone."""
-        super()._place()
-        sil.put_on_floor(self._vehicle)
+        super()._place(rollout)
+        sil.put_on_floor(self._vehicle, self._room.home_m)

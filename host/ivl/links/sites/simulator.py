@@ -2,15 +2,18 @@
 
 from collections.abc import Callable, Iterator
 
+from ivl.check import Check
 from ivl.errors import LinkError
 from ivl.links import preflight, sil
 from ivl.links.clock import COARSE, Clock, LockStep, WallClock
-from ivl.links.landing_flight import FlyingEnds, Landing, Outcome, Point, Rollout, safe_or_why
+from ivl.links.landing_flight import FlyingEnds, Landing, Outcome, Rollout, safe_or_why
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Recording, Request
+from ivl.links.recovery import Attempts, Recovery
 from ivl.links.sites.base import Visit, give_back_time
 from ivl.links.tables import Session
 from ivl.links.vehicle import Command, Vehicle
+from ivl.startpoint import Point
 
 _DIFFERENCES_TOLD = 6
 _IDLE_S, _READY_S = 3.0, 3.0
@@ -40,6 +43,11 @@ class Simulator:
         return sil.is_sil(session) and not options.rehearse
 
     @staticmethod
+    def recovery(session: Session, options: Options) -> Recovery:
+        """There is nobody to ask."""
+        return Attempts(session.uri, options.say)
+
+    @staticmethod
     def make_clock(session: Session, visit: Visit) -> Clock:
         """Lock-step, unless cameras follow the vehicle, which have a time of their own."""
         return LockStep(session, COARSE) if visit.tracking is None else WallClock()
@@ -59,7 +67,7 @@ class Simulator:
             self._meet_other_world(", ".join(found[:_DIFFERENCES_TOLD]) + rest)
         sil.reset(self._vehicle)
 
-    def checks(self) -> Iterator[preflight.Check]:
+    def checks(self) -> Iterator[Check]:
         """The tables alone: the reset before each landing mends the rest, and lock-step waits for a bad link."""
         yield preflight.tables(self._vehicle)
 
@@ -99,6 +107,7 @@ class Simulator:
     def to_start(self, rollout: Rollout) -> Point:
         """Reset; the simulator puts the vehicle to the start of each landing itself, when its approach begins."""
         experiment = self._visit.experiment
+        self._vehicle.has_begun = True
         spec = sil.Spec(experiment.speed_mps, experiment.angle_deg, rollout.seed, rollout.stream, experiment.start)
         return self._extras.reset(spec)
 
@@ -116,6 +125,9 @@ class Simulator:
         # the end of the cycle is also that of a recording which is not full yet
         vehicle.ask_for(Command(Request.IDLE), (Phase.IDLE,), _IDLE_S)
         return outcome, vehicle.recording(policy_seq)
+
+    def end_flight(self) -> None:
+        """Do nothing."""
 
     def told(self, landing: Landing) -> str:
         """Say nothing: it would be many lines a second."""

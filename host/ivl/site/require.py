@@ -1,0 +1,66 @@
+"""Who may fly without a site file, and what a site must be like before a drone flies there."""
+
+from ivl.check import failures
+from ivl.errors import ConfigError
+from ivl.experiment import Experiment
+from ivl.site import file as site_file
+from ivl.site.checks import checks
+from ivl.site.file import SiteFile
+
+DRONE_SCHEMES = ("radio", "usb", "serial")
+"""Links at whose other end there is no software vehicle."""
+LINK_OF_SITE = "site"
+"""What `--uri` says for the link of the site file."""
+HOW = "write a site file with `ivl site new lab.yaml`, measure the room, and add --site lab.yaml"
+_OF_THE_ROOM = ("measured", "tracking")
+"""Checks that say nothing of a rehearsal, which flies in the numbers of the file as they are."""
+
+
+def is_drone(uri: str) -> bool:
+    """Whether this link leads to a vehicle that is no software vehicle."""
+    return uri.partition("://")[0] in DRONE_SCHEMES
+
+
+def for_flight(experiment: Experiment, uri: str, rehearse: bool = False) -> SiteFile | None:
+    """The site file that a flight is flown with; None: a software vehicle in its simulator needs none.
+
+    Raises:
+        ConfigError: A drone or a rehearsal has none, or it is not fit to fly in.
+    """
+    if rehearse and is_drone(uri):
+        raise ConfigError(f"--rehearse: {uri} leads to no software vehicle; leave --uri out, and one is started")
+    if experiment.site is None:
+        if rehearse:
+            raise ConfigError(f"--rehearse: a day is rehearsed in a room that is described: {HOW}")
+        if is_drone(uri):
+            raise ConfigError(f"--uri {uri}: a drone flies only in a room that is described: {HOW}")
+        return None
+    site = site_file.load(experiment.site)
+    if rehearse or is_drone(uri):
+        refuse_unfit(site, experiment, rehearse)
+    return site
+
+
+def refuse_unfit(site: SiteFile, experiment: Experiment, rehearse: bool) -> None:
+    """Refuse a site that does not suit its experiment; a drone's must be measured, and tracked by a real system.
+
+    Raises:
+        ConfigError: The checks that failed, in one line.
+    """
+    found = checks(site, experiment)
+    told = failures(check for check in found if not (rehearse and check.name in _OF_THE_ROOM))
+    if told:
+        raise ConfigError(f"site {site.name}: not fit to fly: {told} (ivl site check shows all)")
+
+
+def link_of(experiment: Experiment, uri: str | None) -> str | None:
+    """A link as it was given; that of the site file where `site` stands for it.
+
+    Raises:
+        ConfigError: There is no site file.
+    """
+    if uri != LINK_OF_SITE:
+        return uri
+    if experiment.site is None:
+        raise ConfigError(f"--uri site: the experiment has no site: {HOW}")
+    return site_file.load(experiment.site).link
