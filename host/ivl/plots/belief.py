@@ -57,14 +57,13 @@ def draw(
         paths: Files to write.
     """
     figure = style.new_figure(8.5, 8.0)
-    axes = figure.subplots(4, 3)
+    grid = figure.add_gridspec(4, 3)
+    axes = [figure.add_subplot(grid[row, column]) for row in range(3) for column in range(3)]
     insights = [row.insight or {} for row in history]
     flights = np.concatenate([[0], np.cumsum([row.n_scored for row in history])])
-    _draw_parameters(axes[:2].ravel(), insights, flights)
-    _draw_flip(axes[2], insights[-1], history[-1].episode, rollouts)
-    for axis in axes[3]:
-        axis.remove()
-    _draw_landings(figure.add_subplot(4, 1, 4), experiment, insights, flights, rollouts)
+    _draw_parameters(axes[:6], insights, flights)
+    _draw_flip(axes[6:], insights[-1], history[-1].episode, rollouts)
+    _draw_landings(figure.add_subplot(grid[3, :]), experiment, insights, flights, rollouts)
     for axis in figure.axes:
         style.finish(axis)
     figure.suptitle(
