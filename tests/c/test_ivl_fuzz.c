@@ -385,7 +385,7 @@ static void test_random_flights_have_visited_everything(void)
     {
         TEST_ASSERT_TRUE_MESSAGE(n_ticks_in[i] > N_TICKS_ALL / 300u, phase_text((ivl_phase_t)i));
     }
-    TEST_ASSERT_TRUE(n_triggers > N_FLIGHTS / 6u);
+    TEST_ASSERT_TRUE(n_triggers > N_FLIGHTS / 8u);  // a policy that is sent in an approach is refused: one flight in six triggers
     TEST_ASSERT_TRUE(n_estimated > N_FLIGHTS / 50u);
     TEST_ASSERT_TRUE(n_general > N_FLIGHTS / 50u);
     TEST_ASSERT_TRUE(n_cycles > n_triggers);

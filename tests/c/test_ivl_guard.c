@@ -109,7 +109,9 @@ static void test_rules_have_an_act(void)
     {
         TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act((ivl_rule_t)no_rules[i]));
         TEST_ASSERT_FALSE(ivl_guard_discards((ivl_rule_t)no_rules[i]));
+#ifndef IVL_NO_TEXT
         TEST_ASSERT_EQUAL_STRING("?", ivl_guard_name((ivl_rule_t)no_rules[i]));
+#endif
         for (int phase = 0; phase < (int)IVL_PHASE_COUNT; phase++)
         {
             TEST_ASSERT_FALSE(ivl_guard_applies((ivl_rule_t)no_rules[i], (ivl_phase_t)phase));
