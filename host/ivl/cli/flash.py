@@ -10,7 +10,7 @@ from ivl import flash as flasher
 from ivl.cli import console
 from ivl.errors import ConfigError
 
-HELP = """Write a firmware IMAGE into a Crazyflie over radio, read it back, and see the vehicle run it.
+HELP = """Write a firmware IMAGE, read it back, see the vehicle run it.
 
 IMAGE is the .bin that `make -C firmware` leaves in firmware/build, or a release of Bitcraze (.zip), of which the main
 processor's firmware is written. It must be for the vehicle that answers. The vehicle restarts in its bootloader, is
