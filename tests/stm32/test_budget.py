@@ -147,3 +147,17 @@ def test_a_part_that_is_not_there_is_not_taken_out(tmp_path: Path) -> None:
     assert all((core / f"ivl_form_{name}.c").exists() for name in parts._FORMS)
     declared = re.findall(r"^\w.*?\b(ivl_level_out_\w+)\(", (core / "ivl_level_out.h").read_text(), re.MULTILINE)
     assert declared == re.findall(r"^\w.*?\b(ivl_level_out_\w+)\(", parts._NO_LEVEL_OUT, re.MULTILINE)
+
+
+def test_of_functions_that_share_a_name_the_largest_counts() -> None:
+    """Static functions of several files: each form of a policy has its own `decide`."""
+    code = """00000000 <decide>:
+   0:\tpush\t{r4, r5, r6, lr}
+   4:\tbl\t100 <one>
+00000020 <decide>:
+  20:\tpush\t{r4, lr}
+  24:\tbl\t200 <two>
+"""
+    frames, calls = objects._call_graph(code)
+    assert frames == {"decide": 16}
+    assert calls == {"decide": {"one", "two"}}

@@ -74,13 +74,15 @@ def worst_stack(program: Path, prefix: str = "arm-none-eabi-") -> dict[str, int]
 def _call_graph(disassembly: str) -> tuple[dict[str, int], dict[str, set[str]]]:
     frames: dict[str, int] = {}
     calls: dict[str, set[str]] = {}
-    name = ""
+    name, frame = "", 0
     for line in disassembly.splitlines():
         if head := _FUNCTION.match(line):
-            name = head[1]
-            frames[name], calls[name] = 0, set()
+            name, frame = head[1], 0
+            frames.setdefault(name, 0)  # static functions of several files may share a name: the largest of them counts
+            calls.setdefault(name, set())
         elif code := _INSTRUCTION.match(line):
-            frames[name] += _taken_from_stack(code[1], code[2])
+            frame += _taken_from_stack(code[1], code[2])
+            frames[name] = max(frames[name], frame)
             if target := _BRANCH.match(f"{code[1]} {code[2]}"):
                 called = target[1].split("+")[0]
                 if called != name or code[1] == "bl":  # a plain branch into itself is a loop
