@@ -127,7 +127,7 @@ static void arrive(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
     }
     if (who == IVL_CRTP_NEW)
     {
-        loop->met_us = loop->told_us = 0; // the first one who wants this client's place is met at once
+        loop->met_us = loop->told_us = 0;  // the first one who wants this client's place is met at once
         ivl_crtp_link(&loop->crtp, true);
     }
     if (is_null)
