@@ -45,7 +45,7 @@ static const ivl_sil_field_t TRACE_FIELDS[] = {IVL_SIM_TRACE_FIELDS(TRACE_ROW)};
 #define DERIVED(X) \
     X(mass_total_kg, "kg", m->mass_total_kg, "body, legs and feet") \
     X(thrust_to_weight, "1", IVL_SIM_MOTORS * m->raw.rotor_thrust_max_N / (m->mass_total_kg * m->raw.world_gravity_mps2), "all motors at their maximum") \
-    X(moment_y_max_Nmm, "N mm", 2000.0 * m->raw.rotor_thrust_max_N * m->raw.rotor_x_m, "front pair at its maximum") \
+    X(pitch_moment_max_Nmm, "N mm", 2000.0 * m->raw.rotor_thrust_max_N * m->raw.rotor_x_m, "front pair at its maximum") \
     X(rotor_speed_hover_radps, "rad/s", m->rotor_speed_hover_radps, "each rotor") \
     X(rotor_speed_max_radps, "rad/s", m->rotor_speed_max_radps, "each rotor") \
     X(leg_frequency_radps, "rad/s", m->leg_frequency_radps, "of a leg about its hip, body held, undamped") \

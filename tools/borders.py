@@ -28,6 +28,7 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
 
+import marked
 import numpy as np
 import yaml
 
@@ -41,7 +42,7 @@ from ivl.sweep.schema import TASKS
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "RELIABILITY.md"
-BEGIN, END = "<!-- measured by tools/borders.py: begin -->\n", "<!-- measured by tools/borders.py: end -->\n"
+BEGIN, END = "<!-- measured by tools/borders.py: begin -->", "<!-- measured by tools/borders.py: end -->"
 TIME_S = 60.0
 """An input that takes longer counts as a traceback."""
 SMALL = ["budget=16", "check.n_fresh=2", "check.effort=0.001"]
@@ -519,8 +520,7 @@ def main() -> None:
             print(f"!! {row.kind}: {text}")
     print(table(rows))
     if arguments.scale == 1.0:
-        before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        PAGE.write_text(before + BEGIN + table(rows) + END + rest.partition(END)[2], encoding="utf-8")
+        marked.write(PAGE, table(rows), BEGIN, END)
     if any(row.tracebacks or row.wrong or row.lost for row in rows):
         raise SystemExit(1)
 

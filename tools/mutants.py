@@ -20,6 +20,7 @@ from pathlib import Path
 
 import cmaes  # noqa: F401 - loaded once for all children
 import hypothesis  # noqa: F401
+import marked
 import matplotlib.pyplot  # noqa: F401
 import numpy as np  # noqa: F401
 import pydantic  # noqa: F401
@@ -32,7 +33,7 @@ from mutant_rules import Mutant, is_other_program, mutants
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "RELIABILITY.md"
 EQUAL = ROOT / "tools" / "mutants_equal.txt"
-BEGIN, END = "<!-- measured by tools/mutants.py: begin -->\n", "<!-- measured by tools/mutants.py: end -->\n"
+BEGIN, END = "<!-- measured by tools/mutants.py: begin -->", "<!-- measured by tools/mutants.py: end -->"
 TREE = ROOT / "build" / "mutants"
 FLAVOUR = "O0"
 """Compiled and linked soonest."""
@@ -345,16 +346,6 @@ def table(results: dict[str, list[Verdict]], seed: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_page(text: str) -> None:
-    """Put the table between its marks."""
-    page = PAGE.read_text(encoding="utf-8")
-    before, _, rest = page.partition(BEGIN)
-    _, found, after = rest.partition(END)
-    if not found:
-        raise SystemExit(f"{PAGE}: the marks of the table are missing")
-    PAGE.write_text(f"{before}{BEGIN}{text}{END}{after}", encoding="utf-8")
-
-
 def main() -> int:
     """Try the faults; exit code 1 if too many were not found."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -375,7 +366,7 @@ def main() -> int:
     for verdict in (v for verdicts in results.values() for v in verdicts if v.ending == SURVIVED):
         print(f"not found: {verdict.mutant}")
     if arguments.scale == 1.0 and arguments.only is None:
-        write_page(text)
+        marked.write(PAGE, text, BEGIN, END)
     # a sample has too few faults for a share of them: there each must be found
     is_sample = arguments.scale < 1.0
     return 0 if all(share(results[area.name]) >= (1.0 if is_sample else area.least) for area in areas) else 1

@@ -11,9 +11,11 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import marked
+
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "RELIABILITY.md"
-BEGIN, END = "<!-- measured by tools/packets.py: begin -->\n", "<!-- measured by tools/packets.py: end -->\n"
+BEGIN, END = "<!-- measured by tools/packets.py: begin -->", "<!-- measured by tools/packets.py: end -->"
 N_SEQUENCES, N_PACKETS = 100_000, 20_000_000
 SEQUENCES_A_PART, INPUTS_A_PART = 5_000, 200_000
 _SEQUENCES = re.compile(r"sequences: (\d+), (\d+) ms, (\d+) flips, nothing broken")
@@ -81,16 +83,6 @@ def table(hostile: Total, sequence: Total) -> str:
     )
 
 
-def write_page(text: str) -> None:
-    """Put the table between its marks."""
-    page = PAGE.read_text(encoding="utf-8")
-    before, _, rest = page.partition(BEGIN)
-    _, found, after = rest.partition(END)
-    if not found:
-        raise SystemExit(f"{PAGE}: the marks of the table are missing")
-    PAGE.write_text(f"{before}{BEGIN}{text}{END}{after}", encoding="utf-8")
-
-
 def main() -> int:
     """Try both; exit code 1 if something broke."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -101,7 +93,7 @@ def main() -> int:
     text = table(hostile, sequence)
     print(text)
     if arguments.scale == 1.0:
-        write_page(text)
+        marked.write(PAGE, text, BEGIN, END)
     return 1 if sequence.broken or hostile.broken else 0
 
 

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import marked
+
 from ivl import experiment, native, run
 from ivl.errors import IvlError
 from ivl.experiment import Experiment
@@ -29,7 +31,7 @@ from ivl.store import RunStore
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "RELIABILITY.md"
-BEGIN, END = "<!-- measured by tools/reliability.py: begin -->\n", "<!-- measured by tools/reliability.py: end -->\n"
+BEGIN, END = "<!-- measured by tools/reliability.py: begin -->", "<!-- measured by tools/reliability.py: end -->"
 STRIKE_EVERY = 40
 """A fault that strikes does so in every so many landings, while the vehicle is in its approach or flip."""
 
@@ -194,16 +196,6 @@ def table(results: list[Result], chosen: Experiment) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_page(text: str) -> None:
-    """Put the table between its marks."""
-    page = PAGE.read_text(encoding="utf-8")
-    before, _, rest = page.partition(BEGIN)
-    _, found, after = rest.partition(END)
-    if not found:
-        raise SystemExit(f"{PAGE}: the marks of the table are missing")
-    PAGE.write_text(f"{before}{BEGIN}{text}{END}{after}", encoding="utf-8")
-
-
 def main() -> int:
     """Run the cases; exit code 1 if one of them did not end right."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -224,7 +216,7 @@ def main() -> int:
     text = table(results, chosen)
     print(text)
     if arguments.only is None and arguments.budget is None:
-        write_page(text)
+        marked.write(PAGE, text, BEGIN, END)
     return 0 if all(r.same and not r.error and not r.n_wrong and not r.n_lost for r in results) else 1
 
 

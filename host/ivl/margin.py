@@ -26,7 +26,8 @@ _REACH, _TRIES = 0.15, 31
 _FIRST, _FINALISTS, _LAST = 20, 5, 200
 """Rollouts for each point of a margin rate at an effort of 1: of all places, and of so many finalists."""
 _LEAST = 5
-MOMENT = "moment_y_Nmm"
+_MOMENT_UNIT = "N mm"
+"""Unit of the parameter of the paper's form that is a moment."""
 
 
 def report(world: World, experiment: Experiment, theta: FloatArray, threads: int | None = None) -> dict[str, Any]:
@@ -44,12 +45,17 @@ def report(world: World, experiment: Experiment, theta: FloatArray, threads: int
         moment), and, where there is a margin rate, `stepped_back`: `theta`, `rate` and `cost`, the margin rate lost.
     """
     rate = None
-    if assess.has_margin(experiment):
+    has_margin = assess.has_margin(experiment)
+    if has_margin:
         rate = float(assess.margin_rates(world, experiment, theta[None], scaled(experiment, _LAST), threads)[0])
     found = []
     for i, p in enumerate(experiment.policy.shape.params):
         (lo, hi), value = experiment.policy.bounds[i], float(theta[i])
-        is_all = p.name == MOMENT and value >= (1.0 - _ON) * float(world.derived()["moment_y_max_Nmm"])
+        is_all = (
+            has_margin
+            and p.unit == _MOMENT_UNIT
+            and value >= (1.0 - _ON) * float(world.derived()["pitch_moment_max_Nmm"])
+        )
         bound = _bound(value, lo, hi) or ("upper" if is_all else None)
         if bound is None:
             continue

@@ -271,7 +271,7 @@ def draw_specs(vehicle: Vehicle, seed: int) -> Specs:
     """The landings of a vehicle."""
     rng = np.random.default_rng([seed, vehicle.number, 1])
     n = LANDINGS_PER_VEHICLE
-    moment_max = min(MOMENT_Y_MAX_NMM, float(vehicle.native_model.derived()["moment_y_max_Nmm"][0]))
+    moment_max = min(MOMENT_Y_MAX_NMM, float(vehicle.native_model.derived()["pitch_moment_max_Nmm"][0]))
     specs = native.library().default_specs(n)
     specs["speed_mps"] = rng.uniform(*SPEED_MPS, n)
     specs["angle_deg"] = rng.uniform(*ANGLE_DEG, n)

@@ -205,7 +205,7 @@ def test_a_recommendation_on_a_bound_is_told_with_what_stepping_back_costs(small
 def test_all_the_moment_there_is_is_told_inside_the_bounds_too(small_data: dict[str, Any], world: Any) -> None:
     small_data["policy"]["moment_y_Nmm"]["bounds"] = [0.0, 15.0]
     chosen = experiment.from_data(small_data, "small.yaml")
-    largest = world.derived()["moment_y_max_Nmm"]
+    largest = world.derived()["pitch_moment_max_Nmm"]
     told = margin.report(world, chosen, np.array([5.0, largest]))["on_bound"]
     assert [(entry["parameter"], entry["is_all_there_is"]) for entry in told] == [("moment_y_Nmm", True)]
     assert margin.report(world, chosen, np.array([5.0, 0.95 * largest]))["on_bound"] == []

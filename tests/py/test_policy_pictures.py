@@ -131,7 +131,7 @@ def test_the_best_of_a_cell_wins_on_flights_that_did_not_propose_it(monkeypatch:
     monkeypatch.setattr(cells, "fly_own", lambda *_: [made_up(finals, 16)])
     place = Place.of(TASK)
     best = cells.best_of_cells(grid, BOX, 0, [place])
-    low, high = (place.world.derived()["moment_y_max_Nmm"] * part for part in (0.5, 0.9))
+    low, high = (place.world.derived()["pitch_moment_max_Nmm"] * part for part in (0.5, 0.9))
     assert best.of_all == pytest.approx((1 / 0.3, high))  # lands in two cells
     third = [1 / 0.3, high]  # second on the grid
     assert best.theta == pytest.approx(np.array([[10.0, low], [1 / 0.3, high], third, [1 / 0.3, low]]))

@@ -157,7 +157,7 @@ def test_values_that_only_together_make_no_sense_are_refused_by_the_library() ->
 def test_derived_values_follow_from_the_parameters(world: ivl.World) -> None:
     derived = world.derived()
     assert derived["mass_total_kg"] == pytest.approx(0.03584 + 4 * (4.4e-4 + 1e-5))
-    assert derived["moment_y_max_Nmm"] == pytest.approx(2000 * 0.1615 * 0.033)
+    assert derived["pitch_moment_max_Nmm"] == pytest.approx(2000 * 0.1615 * 0.033)
 
 
 @settings(max_examples=30, deadline=None)

@@ -51,7 +51,7 @@ Examples:
   ivl learn experiments/paper_vertical.yaml --policy g.yaml
       the search begins at the numbers of a policy for every approach
   ivl learn experiments/paper_flight.yaml --from runs/monday --from runs/tuesday
-      the learner is told first what earlier runs of the same task flew
+      the learner first gets the flights of earlier runs of the same task
   ivl learn --resume --out runs/mine
       go on after Ctrl-C, kill -9 or power loss
 """

@@ -104,7 +104,7 @@ def best_of(flown: Map) -> Best:
 
 def moment_most_Nmm(places: Sequence[Place]) -> float:
     """What the front motors can do in every place."""
-    return float(min(place.world.derived()["moment_y_max_Nmm"] for place in places))
+    return float(min(place.world.derived()["pitch_moment_max_Nmm"] for place in places))
 
 
 def _edges(grid: MapSettings, regions: Sequence[Region]) -> tuple[FloatArray, FloatArray]:
