@@ -93,6 +93,19 @@ def test_a_flight_without_a_trigger_records_nothing(kin: Family) -> None:
     assert np.isnan(features).all()
 
 
+def test_a_flight_of_many_approaches_names_its_own(kin: Family) -> None:
+    many = replace(FLIGHT, approaches=np.array([[1.5, 3.5], [30.0, 90.0]]))
+    assert many.box.shape == (4, 2)
+    own, outcome = recording.simulated(kin.world, many, np.array([4.5, 8.0, 2.0, 60.0]), seed=3, stream=0)
+    one = replace(FLIGHT, speed_mps=2.0, angle_deg=60.0)
+    same, expected = recording.simulated(kin.world, one, np.array([4.5, 8.0]), seed=3, stream=0)
+    assert np.array_equal(own, same, equal_nan=True)
+    assert np.array_equal(outcome, expected)
+    flown = bank.make(kin, many, 6, 3, seed=5)
+    assert flown.theta.shape == (6, 3, 4)
+    assert (np.ptp(flown.theta.reshape(-1, 4), axis=0) > 0.3 * np.ptp(many.box, axis=1)).all()
+
+
 def test_the_gyro_clips_what_is_recorded(kin: Family) -> None:
     rates = [name.startswith("rate") for name in recording.NAMES]
     features, _ = recording.simulated(kin.world, FLIGHT, np.array([3.0, 10.65]), seed=1, stream=0)

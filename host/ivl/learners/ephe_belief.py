@@ -87,7 +87,7 @@ class EpheBelief(EpheMemory):
             return None
         kin = self._simulator.kin
         return {
-            "expected_rate": float(decide.rate(self._belief, self._corrected, self._choice[None])[0]),
+            "expected_rate": float(self.expected_rates(self._choice[None])[0]),
             "margin_rate": self._margin_rate,
             "model_fits": bool(self.model_fits),
             "surprise": self.surprise,
@@ -99,6 +99,11 @@ class EpheBelief(EpheMemory):
             },
             "predicted": self._predicted,
         }
+
+    def expected_rates(self, theta: FloatArray) -> FloatArray:
+        """Landing rates that are expected now of policies, shape (n, dim): shape (n,); only with a belief."""
+        assert self._belief is not None
+        return decide.rate(self._belief, self._corrected, theta)
 
     def _quantiles(self) -> list[list[float]]:
         """Quantiles of each parameter of the family over the particles."""
@@ -152,7 +157,7 @@ class EpheBelief(EpheMemory):
             raise LearnerError(f"tell: meta[{LANDED!r}] is missing: a belief must be told which rollouts landed")
         landed = meta[LANDED].astype(bool)
         self._predicted = self._predict(theta[0], features[0, recording.CONDITIONS])
-        self._foreseen = np.append(self._foreseen, decide.rate(self._belief, self._corrected, theta))
+        self._foreseen = np.append(self._foreseen, self.expected_rates(theta))
         self._theta = np.vstack([self._theta, theta])
         self._features = np.vstack([self._features, emulator.used(features)])
         self._conditions = np.vstack([self._conditions, features[:, recording.CONDITIONS]])
