@@ -67,8 +67,11 @@ def simulator(vehicle: str, before: dict[str, float], sigmas: dict[str, float]) 
     chosen = experiment.load(EXPERIMENT)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{vehicle}.yaml"
-        path.write_text(identify.vehicle_text(vehicle, before, sigmas), encoding="utf-8")
-        home = World(str(path), chosen.gear, chosen.gear_set)
+        path.write_text(identify.vehicle_text(vehicle, {name: before[name] for name in sigmas}, sigmas), encoding="utf-8")
+        files = World(vehicle, chosen.gear, chosen.gear_set).params.values
+        # what an override sets is not drawn
+        known = {name: value for name, value in before.items() if name not in sigmas and value != files[name]}
+        home = World(str(path), chosen.gear, chosen.gear_set, None, **known)
         spreads = {name: spread for name, spread in chosen.family.parameters.items() if name not in sigmas}
         kin = family.of(home, chosen.family.model_copy(update={"parameters": spreads}))
         return Simulator.of(kin, chosen.flight)

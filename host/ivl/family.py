@@ -270,7 +270,7 @@ class Family:
             NativeError: The library refuses it.
         """
         drawn = dict(zip(self.names, self.values(z).tolist(), strict=True))
-        return self.world.changed(**drawn | self.overrides)
+        return self.world.changed(**{**drawn, **self.overrides})
 
     def draw(self, rng: np.random.Generator) -> tuple[FloatArray, World]:
         """One member: z, shape (n,), and its world.
