@@ -14,6 +14,7 @@ from ivl.errors import ConfigError
 from ivl.flight import identify, motion, store
 from ivl.learners import make_learner
 from ivl.learners.base import LANDED, RECORDING
+from ivl.plots import style
 
 EXPERIMENT = "experiments/transfer.yaml"
 MOMENT_NMM, NEAR_NMM = 6.04, 0.3
@@ -67,7 +68,9 @@ def simulator(vehicle: str, before: dict[str, float], sigmas: dict[str, float]) 
     chosen = experiment.load(EXPERIMENT)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{vehicle}.yaml"
-        path.write_text(identify.vehicle_text(vehicle, {name: before[name] for name in sigmas}, sigmas), encoding="utf-8")
+        path.write_text(
+            identify.vehicle_text(vehicle, {name: before[name] for name in sigmas}, sigmas), encoding="utf-8"
+        )
         files = World(vehicle, chosen.gear, chosen.gear_set).params.values
         # what an override sets is not drawn
         known = {name: value for name, value in before.items() if name not in sigmas and value != files[name]}
@@ -111,3 +114,56 @@ def learn(simulated: Simulator, flights: list[Told], seed: int = 0) -> dict[str,
             }
         )
     return {"rates": np.round(rates, 3).tolist(), "flights": rows}
+
+
+def summary(result: dict[str, Any]) -> dict[str, Any]:
+    """After which flight the window that is believed in contains flown landings near its moment, and from when on.
+
+    `first` and `stays` count flights; None: never. `missed`: flights from `first` on after which it does not.
+    """
+    near = [row for row in result["flights"] if row["landed"] and abs(row["moment_Nmm"] - MOMENT_NMM) <= NEAR_NMM]
+    low, high = min(row["threshold_per_s"] for row in near), max(row["threshold_per_s"] for row in near)
+    inside = (low - 1e-9 <= THRESHOLDS_PER_S) & (high + 1e-9 >= THRESHOLDS_PER_S)
+    holds = [bool((np.array(rates)[inside] >= HALF).any()) for rates in result["rates"]]
+    first = holds.index(True) if True in holds else None
+    stays = (
+        None
+        if not holds[-1]
+        else len(holds) - 1 - next((i for i, h in enumerate(holds[::-1]) if not h), len(holds)) + 1
+    )
+    window = THRESHOLDS_PER_S[np.array(result["rates"][-1]) >= HALF]
+    return {
+        "flown_per_s": [low, high],
+        "first": first,
+        "stays": stays,
+        "missed": [] if first is None else [i for i in range(first, len(holds)) if not holds[i]],
+        "window_per_s": [float(window.min()), float(window.max())] if len(window) else None,
+        "best_per_s": float(THRESHOLDS_PER_S[int(np.argmax(result["rates"][-1]))]),
+        "rate": float(np.max(result["rates"][-1])),
+        "rate_in_flown": float(np.array(result["rates"][-1])[inside].mean()),
+        "least_surprise": min(row["surprise"] for row in result["flights"]),
+    }
+
+
+@style.drawing
+def draw(result: dict[str, Any], path: Path) -> None:
+    """Expected landing rate over the threshold, before any flight and after each, with what was flown."""
+    figure = style.new_figure(7.0, 3.6)
+    axes = figure.add_subplot()
+    rates = np.array(result["rates"])
+    shown = axes.imshow(
+        rates.T, origin="lower", aspect="auto", cmap="Blues", vmin=0.0, vmax=1.0, interpolation="nearest",
+        extent=(-0.5, len(rates) - 0.5, THRESHOLDS_PER_S[0] - 0.025, THRESHOLDS_PER_S[-1] + 0.025),
+    )  # fmt: skip
+    for landed, marker, face, label in ((True, "o", style.GREEN, "landed"), (False, "x", style.VERMILION, "failed")):
+        at = [
+            (number, row["threshold_per_s"])
+            for number, row in enumerate(result["flights"], start=1)
+            if row["landed"] == landed and abs(row["moment_Nmm"] - MOMENT_NMM) <= NEAR_NMM
+        ]
+        axes.scatter(*np.array(at).T, marker=marker, s=22, color=face, label=f"real flight that {label}")
+    axes.set_xlabel("real flights that the learner was told")
+    axes.set_ylabel(f"RREV_c (1/s) at {MOMENT_NMM:g} N mm")
+    axes.legend(loc="upper right", fontsize=style.SMALL)
+    figure.colorbar(shown, ax=axes, label="expected landing rate")
+    style.save(figure, [path])

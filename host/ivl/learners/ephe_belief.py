@@ -100,6 +100,12 @@ class EpheBelief(EpheMemory):
             "predicted": self._predicted,
         }
 
+    @property
+    def particles(self) -> FloatArray:
+        """Vehicles that are believed in, shape (n_particles, n_dimensions), see `ivl.family`; only with a belief."""
+        assert self._belief is not None
+        return self._belief.z
+
     def expected_rates(self, theta: FloatArray) -> FloatArray:
         """Landing rates that are expected now of policies, shape (n, dim): shape (n,); only with a belief."""
         assert self._belief is not None
