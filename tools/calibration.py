@@ -4,10 +4,10 @@
     .venv/bin/python tools/calibration.py --drones 50 --json
 
 Each drone is a member of the family of experiments/transfer.yaml. It flies what `ephe_belief` asks for. Then the rank
-of each of its true numbers among the particles is taken (Talts et al. 2018, Validating Bayesian inference algorithms with
-simulation-based calibration): of a belief that is right, all ranks are equally likely, and an interval that is said to
-hold 90 % of the vehicles holds 90 %. The same for the landing rate of what it recommends: its mean against the rate of
-fresh rollouts.
+of each of its true numbers among the particles is taken (Talts et al. 2018, Validating Bayesian inference algorithms
+with simulation-based calibration): of a belief that is right, all ranks are equally likely, and an interval that is
+said to hold 90 % of the vehicles holds 90 %. The landing rate that is expected of the recommendation is compared with
+that of fresh rollouts, too.
 """
 
 import argparse

@@ -19,6 +19,15 @@ from ivl.plots import style
 EXPERIMENT = "experiments/transfer.yaml"
 MOMENT_NMM, NEAR_NMM = 6.04, 0.3
 THRESHOLDS_PER_S = np.arange(2.5, 6.01, 0.05)
+GUARDS: dict[str, dict[str, float]] = {
+    "all of them": {},
+    "the motion of every flight counts in full": {"n_full": 1000.0},
+    "no error of any model": {"discrepancy": 0.0},
+    "every outcome is sure": {"lapse": 1e-6},
+    "no local correction": {"local": 1e-3},
+    "none of them": {"n_full": 1000.0, "discrepancy": 0.0, "lapse": 1e-6, "local": 1e-3},
+}
+"""Options of the learner that hold a belief when no member is the vehicle that flies, and what it is without them."""
 LANDED_LEGS, HALF, HOVER_BEFORE_S = 3, 0.5, 1.0
 
 
@@ -80,8 +89,8 @@ def simulator(vehicle: str, before: dict[str, float], sigmas: dict[str, float]) 
         return Simulator.of(kin, chosen.flight)
 
 
-def learn(simulated: Simulator, flights: list[Told], seed: int = 0) -> dict[str, Any]:
-    """What the default learner believes after each flight.
+def learn(simulated: Simulator, flights: list[Told], seed: int = 0, **options: float) -> dict[str, Any]:
+    """What `ephe_belief` believes after each flight; other options than the default ones are for comparison.
 
     Returns:
         `rates`: expected landing rate over THRESHOLDS_PER_S at MOMENT_NMM before any flight and after each, shape
@@ -91,8 +100,9 @@ def learn(simulated: Simulator, flights: list[Told], seed: int = 0) -> dict[str,
     chosen = experiment.load(EXPERIMENT)
     start = [(p.mu0, p.sigma0) for p in chosen.policy.parameters]
     learner = make_learner(
-        "ephe_belief", [mu for mu, _ in start], [sigma for _, sigma in start], bounds=bounds, n_rollouts=1, seed=seed
-    )
+        "ephe_belief", [mu for mu, _ in start], [sigma for _, sigma in start], bounds=bounds, n_rollouts=1, seed=seed,
+        **options,
+    )  # fmt: skip
     learner.begin(simulated)
     grid = np.stack([THRESHOLDS_PER_S, np.full(len(THRESHOLDS_PER_S), MOMENT_NMM)], axis=1)
     rates, rows = [learner.expected_rates(grid)], []

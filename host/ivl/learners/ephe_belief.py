@@ -44,6 +44,7 @@ class EpheBeliefOptions(EpheMemoryOptions):
     wide: float = Field(default=3.0, ge=1, le=10, description="factor on that size while the alarm is on")
     local_length: float = Field(default=0.2, gt=0, le=10, description="its lengths, in units of sigma0")
     discrepancy: float = Field(default=1.0, ge=0, le=10, description="factor on the errors allowed to any model")
+    n_full: float = Field(default=3.0, ge=1, le=10_000, description="flights whose motion counts in full, all told")
 
 
 class EpheBelief(EpheMemory):
@@ -62,7 +63,8 @@ class EpheBelief(EpheMemory):
 
     def begin(self, simulator: Simulator) -> None:
         """Start from simulated vehicles; before the first `ask` or `load_state_dict`."""
-        trust = Trust(lapse=self.options.lapse, discrepancy=self.options.discrepancy)
+        given = self.options
+        trust = Trust(lapse=given.lapse, discrepancy=given.discrepancy, n_full=given.n_full)
         self._belief = simulator.belief(self._rng, self.options.n_particles, trust)
         self._simulator = simulator
         self._at_first = self._quantiles()
