@@ -153,7 +153,7 @@ static void arrive(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
 static void look_after_client(ivl_crtp_loop_t *loop)
 {
     ivl_crtp_datagram_t d;
-    const bool is_there = ivl_crtp_udp_tells(loop->session.peer) && ivl_crtp_faults_idle(&loop->faults, loop->now_us);
+    const bool          is_there = ivl_crtp_udp_tells(loop->session.peer) && ivl_crtp_faults_idle(&loop->faults, loop->now_us);
     if (ivl_crtp_session_expire(&loop->session, loop->now_us, is_there))
     {
         end_session(loop);
