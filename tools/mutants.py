@@ -369,7 +369,7 @@ def try_area(area: Area, number: int, seed: int, equal: dict[tuple[str, str, str
 
 
 def check_untouched(area: Area) -> dict[str, int]:
-    """Without a fault every test must pass, or nothing is said by one that fails; seconds of processor each may take."""
+    """Refuse tests that fail without a fault, and measure the others: how many seconds of processor each may take."""
     limits, bad = {}, []
     is_c = sources(area)[0].endswith(".c")
     for test in programs(area, sources(area)[0]) if is_c else area.tests:
