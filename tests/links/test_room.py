@@ -188,7 +188,7 @@ def test_nothing_but_the_operator_ends_a_day(
 ) -> None:
     """Preflight refusals are no attempts: forty of them in a row, and the policy is flown all the same."""
     refused = iter(range(40))
-    fit = type(source._site)._make_fit
+    fit = Room._make_fit
 
     def make_fit(site: Room) -> None:
         if next(refused, None) is not None:

@@ -17,6 +17,7 @@ from ivl.site import require
 
 if TYPE_CHECKING:
     from ivl.links.operators import Operator
+    from ivl.rehearsal.script import Script
 
 HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
 
@@ -91,8 +92,13 @@ def learn(
     mocap: Annotated[
         str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
     ] = None,
+    script: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="What goes wrong on a rehearsed day: a file, default (the default), or calm."),
+    ] = None,
     answers: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Answers of a rehearsal's operator, one a line.")
+        str | None,
+        typer.Option(metavar="FILE", help="Answers of a rehearsal's operator, one a line; or script: it answers."),
     ] = None,
     other_world: Annotated[
         bool, typer.Option("--other-world", help="Also fly a software vehicle that simulates another world.")
@@ -102,7 +108,7 @@ def learn(
 ) -> None:
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume, site)
-    uri = require.link_of(chosen, uri) or (f"{links.REHEARSAL_SCHEME}://" if rehearse else None)
+    uri = require.link_of(chosen, uri, site if path is None else None) or (f"{links.REHEARSAL_SCHEME}://" if rehearse else None)
     if uri is not None:
         require.for_flight(chosen, uri, rehearse)
     folder = out or run.default_folder(chosen, n_trials, resume)
@@ -111,6 +117,8 @@ def learn(
         mocap=site_options.tracker(chosen, uri, mocap, rehearse),
         rehearse=rehearse,
         operator=_operator(answers, rehearse),
+        script=_script(script, uri),
+        answered_by_script=_answers_itself(answers, rehearse, uri),
         other_world=other_world,
         start_hint=_start_hint(path or str(folder / "config.yaml"), _said(settings, site), uri or ""),
         say=console.say,
@@ -133,19 +141,56 @@ def learn(
         raise failure
 
 
-def _operator(answers: Path | None, rehearse: bool) -> "Operator | None":
+_BY_SCRIPT = "script"
+"""What `--answers` says for a rehearsal whose script answers."""
+
+
+def _script(name: str | None, uri: str | None) -> "Script | None":
+    """What goes wrong on a rehearsed day; None: it is none with a vehicle of its own.
+
+    Raises:
+        ConfigError: There is no such script, or nothing that it could happen to.
+    """
+    if not _is_own(uri):
+        if name is not None:
+            raise ConfigError(f"--script {name}: a script is for a rehearsal (--rehearse) without --uri")
+        return None
+    from ivl.rehearsal import script as scripts  # its modules load much of the links
+
+    return scripts.load(name or scripts.DEFAULT)
+
+
+def _is_own(uri: str | None) -> bool:
+    """Whether a rehearsal starts its software vehicle itself."""
+    return uri is not None and uri.startswith(links.REHEARSAL_SCHEME)
+
+
+def _answers_itself(answers: str | None, rehearse: bool, uri: str | None) -> bool:
+    """Whether the script answers, and not a person.
+
+    Raises:
+        ConfigError: There is no script that could.
+    """
+    if answers != _BY_SCRIPT:
+        return False
+    if not (rehearse and _is_own(uri)):
+        raise ConfigError("--answers script: only a rehearsal (--rehearse) without --uri has a script that answers")
+    return True
+
+
+def _operator(answers: str | None, rehearse: bool) -> "Operator | None":
     """The operator of a rehearsal whose answers are in a file; None: asked at the terminal.
 
     Raises:
         ConfigError: It is no rehearsal, or the file cannot be read.
     """
-    if answers is None:
+    if answers is None or answers == _BY_SCRIPT:
         return None
     if not rehearse:
         raise ConfigError(f"--answers {answers}: only a rehearsal (--rehearse) is answered from a file")
     from ivl.links.operators import ConsoleOperator, answers_of  # its modules load cflib
 
-    return ConsoleOperator(countdown_s=0, read=answers_of(answers))
+    return ConsoleOperator(countdown_s=0, read=answers_of(Path(answers)))
 
 
 def _said(settings: list[str] | None, site: str | None) -> list[str]:
@@ -173,10 +218,10 @@ def _choose(
         raise ConfigError(
             "EXPERIMENT is missing (only `--resume --out FOLDER` goes without); see: ivl list experiments"
         )
-    if settings or learner or policy_file or site or seed is not None or trials is not None:
+    if settings or learner or policy_file or seed is not None or trials is not None:
         raise ConfigError(
             "--resume without EXPERIMENT takes all from the run folder: "
-            "leave out --set, --learner, --policy, --site, --seed and --trials"
+            "leave out --set, --learner, --policy, --seed and --trials"
         )
     return run.read_config(out)
 

@@ -181,6 +181,16 @@ class Columns:
         self._status = np.full((len(self._log.trials), self._n), PLANNED, dtype=f"U{len(DISCARDED)}")
         self._log.theta[self._trials, episode] = theta
 
+    def fly_instead(
+        self,
+        episode: int,
+        trial: npt.NDArray[np.int64],
+        idx: npt.NDArray[np.int64],
+        theta: FloatArray,
+    ) -> None:
+        """Keep policies as flown; a sweep has no operator, but records what it is told."""
+        self._log.theta[trial, episode, idx] = theta
+
     def score(
         self,
         episode: int,
