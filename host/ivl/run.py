@@ -143,7 +143,11 @@ def run(
     manifest = make_manifest(packed, files_world, n_trials, uri)
     if earlier and resume and (folder / "manifest.json").exists():
         raise ConfigError(f"--from: {folder} is resumed with the flights that it began with: leave it out")
-    told = gather([_read_run(run) for run in earlier], chosen, uri, each) if earlier else (kept_earlier(folder) if resume else None)
+    told = (
+        gather([_read_run(run) for run in earlier], chosen, uri, each)
+        if earlier
+        else (kept_earlier(folder) if resume else None)
+    )
     if told is not None:
         content = told.to_bytes()
         copies = copies | {EARLIER_FILE: content}

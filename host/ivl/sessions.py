@@ -22,7 +22,7 @@ _TOLD = {
 
 
 def session_of(manifest: Mapping[str, Any], vehicle: str) -> dict[str, Any]:
-    """What is kept of a session, from the manifest that a run would have that began now; `vehicle` as it says itself."""
+    """What is kept of a session: of the manifest that a run would have that began now, and which vehicle flies."""
     kept = {name: manifest[name] for name in _TOLD if name != "vehicle"}
     return {"utc": datetime.now(UTC).isoformat(timespec="seconds"), **kept, "vehicle": vehicle}
 

@@ -265,7 +265,8 @@ class RunStore:
                     raise StoreError(f"{self.folder}: a rollout that is flown with another policy was not planned")
                 self._db.execute(f"UPDATE rollout SET {', '.join(f'{n}=?' for n in names)} WHERE {key}", (*policy, *at))
                 said = [dict(zip(names, values, strict=True)) for values in (before, policy)]
-                self._keep(Amendment(*at, _utc(), getpass.getuser(), "another policy was flown instead", *said))
+                why = "another policy was flown instead"
+                self._keep(Amendment(of_trial, episode, place, _utc(), getpass.getuser(), why, said[0], said[1]))
 
     def amend(
         self,
@@ -319,7 +320,7 @@ class RunStore:
         )
         said = (json.dumps(said, allow_nan=False) for said in (made.before, made.after))
         values = (made.trial, made.episode, made.idx, made.utc, made.who, made.why, *said)
-        self._db.execute(f"INSERT INTO amendment VALUES({_marks(values)})", values)
+        self._db.execute("INSERT INTO amendment VALUES(?,?,?,?,?,?,?,?)", values)
 
     def finish_episode(self, rows: Sequence[EpisodeRow], states: Iterable[Mapping[str, Any]]) -> None:
         """Commit one episode of some trials: its figures and the learners' states after `tell`, in one transaction."""

@@ -70,7 +70,7 @@ def days(tmp_path_factory: pytest.TempPathFactory) -> Days:
         patch.setattr(preflight, "P95_S_MAX", 10.0)  # a busy machine answers pings late; that is no fault of the room
         look_at_truth(patch, seen)
         first = bad_day.model_copy(update={"ends_before": FIRST_DAY + 1})
-        with pytest.raises(OperatorStopped):
+        with pytest.raises(OperatorStopped, match="the script's operator ends the day"):
             fly(seen, first, resume=False)
         patch.setattr(type(native.library()), "digest", lambda _: "rebuilt")
         seen.result = fly(seen, bad_day, resume=True)
@@ -122,7 +122,7 @@ def test_each_kind_of_fault_has_struck_once_and_has_its_outcome(days: Days) -> N
     plan = scripts.load("default").plan(BUDGET)
     struck = [line for line in days.said if line.startswith("rehearsal: ")]
     happened = {row.happens: row for row in FAULTS}
-    assert Counter(line.partition(": ")[2].partition(": ")[2] for line in struck) == Counter(happened)
+    assert Counter(line.partition(": ")[2].partition(": ")[2] for line in struck) == Counter(happened.keys())
     assert sorted(kind for kinds in plan.values() for kind in kinds) == sorted(Kind)
     for line in struck:
         number, text = line.removeprefix("rehearsal: rollout ").split(": ", 1)
@@ -151,7 +151,6 @@ def test_the_second_day_says_what_is_another_one_and_goes_on(days: Days) -> None
     assert any("the native library is another one: it was rebuilt" in note for note in days.notes)
     manifest = json.loads((days.folder / "manifest.json").read_text())
     assert [session["library_sha256"] == "rebuilt" for session in manifest["sessions"]] == [False, True]
-    assert days.journal(FIRST_DAY + 1)[0].startswith("ended: the script's operator ends the day")
 
 
 def test_faults_leave_no_trace_in_what_is_learned(days: Days) -> None:
@@ -212,7 +211,7 @@ def test_a_script_that_is_none_is_refused_in_a_line(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="is there already"):
         scripts.write_new(path)
     path.write_text(path.read_text().replace("what: locks", "what: lock"))
-    with pytest.raises(ConfigError, match="'lock' is unknown.*locks"):
+    with pytest.raises(ConfigError, match=r"'lock' is unknown.*locks"):
         scripts.load(str(path))
     with pytest.raises(ConfigError, match=r"no such script \(shipped: calm, default\)"):
         scripts.load("nowhere")

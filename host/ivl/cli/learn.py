@@ -94,7 +94,7 @@ def learn(
     ] = None,
     script: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="What goes wrong on a rehearsed day: a file, default (the default), or calm."),
+        typer.Option(metavar="FILE", help="What goes wrong on a rehearsed day: a file, default, or calm."),
     ] = None,
     answers: Annotated[
         str | None,
@@ -108,7 +108,9 @@ def learn(
 ) -> None:
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume, site)
-    uri = require.link_of(chosen, uri, site if path is None else None) or (f"{links.REHEARSAL_SCHEME}://" if rehearse else None)
+    uri = require.link_of(chosen, uri, site if path is None else None) or (
+        f"{links.REHEARSAL_SCHEME}://" if rehearse else None
+    )
     if uri is not None:
         require.for_flight(chosen, uri, rehearse)
     folder = out or run.default_folder(chosen, n_trials, resume)

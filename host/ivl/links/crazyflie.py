@@ -22,6 +22,7 @@ from ivl.errors import LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight
 from ivl.links.connection import check_uri
+from ivl.links.forecast import Forecasts
 from ivl.links.journal import Journal
 from ivl.links.landing_flight import FlyingEnds, Landing, LandingFlight, Rollout
 from ivl.links.options import Options
@@ -63,6 +64,7 @@ class CrazyflieSource:
         self.uri, self._experiment, self.options = uri, experiment, options or Options()
         self._site_file = self.options.site_of(experiment, uri)
         self.world = experiment.make_world()
+        self._forecasts = Forecasts(self.world, experiment)
         self._vehicle: Vehicle | None = None
         self._site: Site | None = None
         self._tracking: Tracking | None = None
@@ -255,7 +257,9 @@ class CrazyflieSource:
     def _open_site(self, session: Session, again: bool) -> Site:
         if self.options.mocap is not None:
             self._tracking = Tracking(session, self.options.mocap, self._frame())
-        visit = Visit(self._experiment, self.world, self.options, self._site_file, self._tracking, self._warn)
+        visit = Visit(
+            self._experiment, self.world, self.options, self._site_file, self._tracking, self._forecasts, self._warn
+        )
         kind = site_for(session, self.options)
         self._recovery = self._recovery or kind.recovery(session, self.options)
         clock = kind.make_clock(session, visit)

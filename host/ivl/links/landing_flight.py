@@ -186,7 +186,9 @@ def make_safe(vehicle: Vehicle, emergency_W_m: tuple[float, float] | None = None
         if vehicle.phase == Phase.ABORTED:
             # a new connection asks for IDLE, which one that has landed obeys
             vehicle.wait(
-                lambda: vehicle.rule in ("landed", "lost") or vehicle.phase == Phase.IDLE, 60.0, "landing after an abort"
+                lambda: vehicle.rule in ("landed", "lost") or vehicle.phase == Phase.IDLE,
+                60.0,
+                "landing after an abort",
             )
             done.append("landed")
         elif vehicle.phase == Phase.IDLE and vehicle.is_flying():

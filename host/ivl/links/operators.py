@@ -15,6 +15,7 @@ from rich.console import Console
 
 from ivl.errors import ConfigError
 from ivl.forms import Form
+from ivl.links.forecast import Forecast
 from ivl.links.landing_flight import FlyingEnds
 from ivl.links.trouble import Cause, Instead, Vetoed, state_of
 from ivl.links.truth import Resting
@@ -25,22 +26,6 @@ _RESUME = "the run can be resumed"
 
 class OperatorStopped(FlyingEnds):
     """The operator wants no further flight; the run can be resumed."""
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """What the simulator expects of a policy, from `n` landings with random numbers of its own."""
-
-    n: int
-    n_landed: int
-    n_strikes: int
-
-    def __str__(self) -> str:
-        """In one line; a strike does not land, and its body or rotors touch the ceiling."""
-        return (
-            f"simulated: {self.n_landed} of {self.n} land; risk: {self.n_strikes} of {self.n} strike the ceiling "
-            "with body or rotors"
-        )
 
 
 @dataclass(frozen=True)
@@ -62,7 +47,7 @@ class Upcoming:
     n_all: int
     form: Form
     theta: tuple[float, ...]
-    bounds: Sequence[tuple[float, float]]
+    bounds: Sequence[Sequence[float]]
     forecast: Forecast
     start_W_m: tuple[float, float, float]
     home_W_m: tuple[float, float]

@@ -233,7 +233,7 @@ class Vehicle:
                 raise LinkError(f"{self.session.uri}: nothing was heard for {self.session.silence_s:.1f} s")
 
     def pause_until(self, condition: Callable[[], bool], limit_s: float, step_s: float) -> bool:
-        """Let time pass until a condition holds; returns whether it does after `limit_s` of vehicle time at the latest."""
+        """Let time pass until a condition holds; returns whether it does within `limit_s` of vehicle time."""
         end_s = self.clock.now_s() + limit_s
         while not (found := condition()) and self.clock.now_s() < end_s:
             self.pause(step_s)

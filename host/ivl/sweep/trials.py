@@ -104,6 +104,8 @@ def run(sweep: Sweep, world: World, trials: Sequence[Trial]) -> Log:
 class Approaches:
     """Source of rollouts in which every trial has its own approach: a whole plan as one native batch on one thread."""
 
+    is_flown, vehicle = False, ""
+
     def __init__(self, sweep: Sweep, world: World, trials: Sequence[Trial]) -> None:
         """Fly the approaches of `trials` in `world`."""
         self.warnings: list[str] = []

@@ -13,6 +13,7 @@ from ivl.check import Check
 from ivl.errors import LinkError
 from ivl.experiment import Experiment
 from ivl.links.clock import Clock
+from ivl.links.forecast import Forecasts
 from ivl.links.landing_flight import Landing, Outcome, Rollout
 from ivl.links.options import Options
 from ivl.links.packets import Recording
@@ -35,6 +36,7 @@ class Visit:
         options: How it is flown.
         site_file: The room as measured; None: a simulator has none.
         tracking: Motion capture that follows the vehicle; None: there is none of ours.
+        forecasts: What the simulator expects of a policy.
         warn: Called with what a reader of the results has to know.
     """
 
@@ -43,6 +45,7 @@ class Visit:
     options: Options
     site_file: SiteFile | None
     tracking: Tracking | None
+    forecasts: Forecasts
     warn: Callable[[str], None]
 
 

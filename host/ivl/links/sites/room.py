@@ -7,7 +7,6 @@ import numpy as np
 
 from ivl.check import Check
 from ivl.errors import ConfigError
-from ivl.experiment import Experiment
 from ivl.links import operators, preflight, sil
 from ivl.links.clock import Clock, WallClock
 from ivl.links.landing_flight import (
@@ -19,7 +18,7 @@ from ivl.links.landing_flight import (
     make_safe,
     safe_or_why,
 )
-from ivl.links.operators import ConsoleOperator, Forecast, Upcoming
+from ivl.links.operators import ConsoleOperator, Upcoming
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Recording, Request
 from ivl.links.recovery import AskOperator, Recovery
@@ -30,11 +29,10 @@ from ivl.links.tracking import Tracked
 from ivl.links.trouble import Cause, Trouble, of_checks
 from ivl.links.truth import Resting, note_no_go, outcome_of_flight, suggest_legs
 from ivl.links.vehicle import Command, Supervisor, Vehicle
-from ivl.outcome import four_leg, verdict
+from ivl.outcome import verdict
 from ivl.site.require import HOW, refuse_unfit
 from ivl.startpoint import Point, start_point
 from ivl.surface import Surface
-from ivl.world import World
 
 CLIMB_MPS, TRAVEL_MPS = 0.5, 0.5
 NEAR_M = 0.1
@@ -43,8 +41,6 @@ HOME_M = 0.3
 """It stands at home when its estimate is as near as this, along the floor and in height."""
 AWAY_S = 120.0
 """An operator who has not answered for so long was away: the vehicle is checked again before it is armed."""
-FORECASTS = 64
-_FORECAST_SEED = 2**63 - 1  # no trial has it: a forecast must not draw the numbers of the landing
 SURE_LEGS = (0, 4)
 """Legs of which a resting pose alone tells: hanging level, or not at the ceiling."""
 _FIT = Supervisor.ARMED | Supervisor.CAN_FLY
@@ -170,7 +166,7 @@ class Room:
         form = experiment.policy.shape
         return Upcoming(
             rollout.stream + 1, experiment.budget, form, rollout.theta, experiment.policy.bounds,
-            forecast(self._world, experiment, rollout),
+            self._visit.forecasts.of(rollout.theta),
             self._start_W_m, self._room.home_m,
         )  # fmt: skip
 
@@ -334,16 +330,6 @@ class Nearest:
         if gap_m < self.gap_m:
             self.gap_m = gap_m
         return False
-
-
-def forecast(world: World, experiment: Experiment, rollout: Rollout) -> Forecast:
-    """What the simulator in this process expects of a policy."""
-    out = world.rollouts(
-        experiment.speed_mps, experiment.angle_deg, *rollout.theta, form=experiment.policy.form,
-        seed=_FORECAST_SEED, stream=np.arange(FORECASTS, dtype=np.uint64), start=experiment.start,
-    )  # fmt: skip
-    landed = four_leg(out)
-    return Forecast(FORECASTS, int(landed.sum()), int((~landed & (out["body_contact"] != 0)).sum()))
 
 
 def resting_by_estimate(vehicle: Vehicle, recording: Recording) -> Resting:
