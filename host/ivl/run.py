@@ -34,6 +34,7 @@ from ivl import (
     sessions,
     yamlfile,
 )
+from ivl import flown as flown_landings
 from ivl.belief.simulator import Simulator
 from ivl.errors import ConfigError, StoreError
 from ivl.experiment import Experiment
@@ -179,6 +180,9 @@ def run(
         source.close()
         flown = _Flown(chosen, worlds, each, store.episodes(), store.rollouts(), threads)
         bests, verdicts, summary = _judge(flown, folder, n_trials, hooks)
+        if source.is_flown:
+            found = flown_landings.landings(folder, chosen, worlds[0], flown.rollouts)
+            summary["flown"] = flown_landings.summary(found, flown.rollouts)
         summary |= {
             "run_dir": str(folder),
             "learner": chosen.learner.name,

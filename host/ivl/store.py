@@ -310,7 +310,10 @@ class RunStore:
             if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name='amendment'").fetchone():
                 return []
             rows = self._db.execute("SELECT * FROM amendment ORDER BY rowid").fetchall()
-            return [Amendment(*row[:6], json.loads(row[6]), json.loads(row[7])) for row in rows]
+            return [
+                Amendment(trial, episode, idx, utc, who, why, json.loads(before), json.loads(after))
+                for trial, episode, idx, utc, who, why, before, after in rows
+            ]
 
     def _keep(self, made: Amendment) -> None:
         """A row of the table of amendments, which only a run has in which somebody changed something."""

@@ -68,7 +68,7 @@ def test_a_day_is_rehearsed_stopped_and_resumed(folder: Path, capsys: pytest.Cap
     assert result["warnings"][-1] == "flights that do not count, by cause: discarded 1"
     journal = [json.loads(line) for line in (folder / "run" / "flights.jsonl").read_text().splitlines()]
     assert [line["what"].partition(":")[0] for line in journal] == [
-        "flown", "vetoed", "discarded", "flown", "flown",
+        "flown", "vetoed", "discarded", "not begun", "flown", "flown",
     ]  # fmt: skip
     assert [line.get("n_legs") for line in journal if line["what"] == "flown"] == [4, 3, 0]
     assert len(list((folder / "run" / "recordings").iterdir())) == 3

@@ -288,16 +288,36 @@ def _lines_of_one(result: run.RunResult) -> list[tuple[str, str]]:
     summary, experiment = result.summary, result.experiment
     found = zip(experiment.policy.shape.params, summary["mu"], summary["sigma"], strict=True)
     reached = summary["rollouts_to_convergence"]
+    flown = summary.get("flown")
+    by = " (judged by the simulator)" if flown else ""
     return [
-        ("solved", f"yes, after {reached} rollouts" if summary["solved"] else "no"),
+        *([] if flown is None else _lines_of_flown(flown)),
+        ("solved", (f"yes, after {reached} rollouts" if summary["solved"] else "no") + by),
         *((p.symbol, f"{mu:.2f} ± {sigma:.2f} {p.unit}") for p, mu, sigma in found),
         ("landing rate, last three episodes", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
-        ("of the recommended policy", _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"])),
+        (
+            "of the recommended policy" + (", simulated" if flown else ""),
+            _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"]),
+        ),
         *margin.lines(summary["margin"], result.best, experiment),
         *([] if summary["model_fits"] is None else [("model", console.MODEL_FITS[summary["model_fits"]])]),
         ("failed landings until convergence", str(summary["failed_landings"])),
         ("failed landings in all", f"{summary['failed_landings_total']} of {summary['rollouts']} rollouts"),
     ]
+
+
+def _lines_of_flown(flown: dict[str, Any]) -> list[tuple[str, str]]:
+    """What the vehicle has flown, before anything that is simulated."""
+    interval = f"95 %: {console.percent(flown['rate_lo'])} .. {console.percent(flown['rate_hi'])}"
+    lines = [
+        ("flown: landed on four legs", f"{flown['landed']} of {flown['landings']} ({console.percent(flown['rate'])}, "
+                                       f"{interval}); simulated, the same policies: "
+                                       f"{console.percent(flown['simulated_rate'])}"),
+    ]  # fmt: skip
+    if flown["pitch_rms_deg_median"] is not None:
+        text = f"pitch {flown['pitch_rms_deg_median']:.1f} deg rms, median of the flips"
+        lines.append(("recorded against simulated", text))
+    return lines
 
 
 def _lines_of_trials(summary: dict[str, Any]) -> list[tuple[str, str]]:
