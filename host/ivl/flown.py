@@ -84,7 +84,8 @@ def as_trace(flight: Flight, world: World, outcome: Any, simulated: Trace) -> Tr
         width = int(np.prod(rows.dtype[name].shape))
         columns = [name] if name in flight.columns else [f"{name}_{i + 1}" for i in range(width)]
         if all(column in flight.columns for column in columns):
-            rows[name] = np.column_stack([flight.columns[column] for column in columns]).reshape(rows[name].shape)
+            values = np.column_stack([flight.columns[column] for column in columns])
+            rows[name] = np.nan_to_num(values).reshape(rows[name].shape)  # a cue that there was not
     first = simulated.rows[0]
     feet_B = (first.foot_W_m.reshape(4, 3) - first.p_WB_m) @ rotation(first.q_WB)
     turned = np.einsum("ijn,lj->nli", rotation(rows["q_WB"].T), feet_B)
