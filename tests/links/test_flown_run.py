@@ -115,15 +115,15 @@ def test_an_amended_outcome_keeps_who_when_and_what_was_there(
     assert (tuple(learner.result.mu), tuple(learner.result.sigma)) == (last.mu, last.sigma)
 
 
-def test_a_landing_can_be_taken_out_and_back_and_the_run_is_as_it_was(days: Days, copied: Path) -> None:
+def test_a_landing_can_be_taken_out_and_back_and_the_run_is_as_it_was(copied: Path) -> None:
     def stored() -> tuple[object, ...]:
         with RunStore.open_reading(copied, native.library().outcome_dtype) as store:
-            return store.episodes()[-1].mu, store.rollouts().status[7], store.learner_states()[0]
+            return [row.mu for row in store.episodes()], store.rollouts().status[7], store.learner_states()[0]
 
     before = stored()
     amend(copied, 8, Change(counts=False), "anna", "the net had touched it")
     assert stored()[1] == DISCARDED
-    assert stored()[0] != before[0] or days.rollouts().reward[7] == 0.0
+    assert stored()[0] != before[0]
     amend(copied, 8, Change(counts=True), "anna", "it had not")
     assert stored() == before
     assert stored()[1] == SCORED

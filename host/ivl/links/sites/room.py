@@ -45,8 +45,8 @@ SURE_LEGS = (0, 4)
 """Legs of which a resting pose alone tells: hanging level, or not at the ceiling."""
 _FIT = Supervisor.ARMED | Supervisor.CAN_FLY
 _LOOK_S = 0.02
-_TURNED = (Phase.COAST, Phase.ATTACHED, Phase.DONE, Phase.LEVEL_OUT, Phase.ABORTED)
-"""Phases in which nobody needs to look how near an approach that never triggered has come."""
+_TURNED = (Phase.COAST, Phase.ATTACHED, Phase.DONE)
+"""Phases after a flip, which the recorder has: nobody needs to look how near the vehicle came."""
 _SETTLE_S, _IDLE_S, _ARM_S, _END_S = 1.0, 3.0, 8.0, 30.0
 
 
@@ -231,7 +231,12 @@ class Room:
         """Wait until the motors are off for good, read the recorder, and let the operator confirm what is seen."""
         vehicle = self._vehicle
         nearest = Nearest(self._world.surface, self._position_W_m)
-        vehicle.wait(lambda: nearest.look() or vehicle.phase in _TURNED, _END_S, "end of the approach", _LOOK_S)
+        vehicle.wait(
+            lambda: nearest.look() or vehicle.phase in _TURNED or self._is_over(),
+            _END_S,
+            "end of the approach",
+            _LOOK_S,
+        )
         vehicle.wait(self._is_over, _END_S, "end of the landing")
         level_out = None
         if vehicle.phase == Phase.LEVEL_OUT:
