@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ivl.experiment import Experiment
 from ivl.links.deadlines import DEADLINES, Deadlines
+from ivl.links.observer import Nobody, Observer
 from ivl.mocap.config import MocapConfig
 from ivl.site import require
 from ivl.site.file import SiteFile
@@ -35,6 +36,7 @@ class Options:
             what it says.
         say: Called with each line for people.
         deadlines: Limits of the link.
+        observer: Who looks on.
     """
 
     folder: Path | None = None
@@ -46,6 +48,7 @@ class Options:
     keep_recordings: bool = False
     say: Callable[[str], None] = silent
     deadlines: Deadlines = DEADLINES
+    observer: Observer = Nobody()
 
     def site_of(self, experiment: Experiment, uri: str) -> SiteFile | None:
         """The site file that a flight of an experiment is flown with (as `ivl.site.require.for_flight`)."""
