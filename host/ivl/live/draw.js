@@ -4,7 +4,7 @@
 const COLOUR = { ink: "#e8edf2", soft: "#9aa8b5", line: "#2b343d", surface: "#7d8b99", fence: "#f0b429", trail: "#58b4f0",
   body: "#c9d4de", front: "#f0b429", rear: "#58b4f0", leg: "#c9d4de", stuck: "#2fc08d" };
 const HIP_SIGNS = [[1, -1], [-1, -1], [-1, 1], [1, 1]];
-const TRAIL_MAX = 400, ROOM_MAX_M = 12, LEAST_M = 0.9;
+const TRAIL_MAX = 400, ROOM_MAX_M = 12, LEAST_M = 0.9, CLOSE_M = 0.36;
 
 function rotate([x, y, z, w], v) {
   const t = [2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])];
@@ -70,6 +70,19 @@ function drawRoom(canvas, room, moment, trail, [a, b]) {
   return { body: to(moment.p_W_m), surface: to(point), scale };
 }
 
+// The vehicle from the side, in the middle, with the surface if that is near.
+function drawClose(canvas, room, moment) {
+  const { context, width, height } = fresh(canvas);
+  if (!width || !room || !moment || moment.p_W_m[0] === null) return;
+  const scale = Math.min(width, height) / CLOSE_M, { point_W_m: point, normal_W: n } = room.surface, middle = moment.p_W_m;
+  const to = (p) => [width / 2 + scale * (p[0] - middle[0]), height / 2 - scale * (p[2] - middle[2])];
+  const s = (middle[0] - point[0]) * n[2] - (middle[2] - point[2]) * n[0];
+  const at = (d) => to([point[0] + (s + d) * n[2], 0, point[2] - (s + d) * n[0]]);
+  line(context, [at(-CLOSE_M), at(CLOSE_M)], COLOUR.surface, 6);
+  drawVehicle(context, room.shapes, moment, to);
+  words(context, "close, from the side", 4, 13, COLOUR.soft, "left", 12);
+}
+
 function drawFence(context, room, flat, [a, b]) {
   const [[l, r], [d, u]] = [room.fence_m[a], room.fence_m[b]];
   if (r - l > ROOM_MAX_M || u - d > ROOM_MAX_M) return;
@@ -81,6 +94,7 @@ function drawFence(context, room, flat, [a, b]) {
 function drawSurface(context, room, board, to, flat, [a, b], width) {
   const { point_W_m: point, normal_W: n } = room.surface;
   if (b !== 2) {
+    words(context, "from above", 4, 13, COLOUR.soft, "left", 12);
     const [[l, r], [d, u]] = board, corner = flat(l, u), other = flat(r, d);
     context.fillStyle = "rgba(125,139,153,0.18)";
     context.fillRect(corner[0], corner[1], other[0] - corner[0], other[1] - corner[1]);
@@ -92,7 +106,7 @@ function drawSurface(context, room, board, to, flat, [a, b], width) {
   const along = [n[2], 0, -n[0]], size = Math.hypot(...along) || 1;
   const at = (s) => to(point.map((value, i) => value + (s * along[i]) / size));
   line(context, [at(board[0][0]), at(board[0][1])], COLOUR.surface, 6);
-  words(context, `surface ${point[2].toFixed(2)} m`, at(board[0][1])[0] + 8, at(board[0][1])[1] + 4, COLOUR.soft);
+  words(context, `surface ${point[2].toFixed(2)} m`, at(board[0][0])[0], at(board[0][0])[1] + 18, COLOUR.soft);
   const floor = flat(0, 0)[1];
   line(context, [[0, floor], [width, floor]], COLOUR.line, 2);
 }
@@ -102,7 +116,7 @@ function drawPlaces(context, room, flat, b) {
   for (const [name, place] of [["home", room.site.home_m], ["emergency", room.site.emergency_m]]) {
     const [x, y] = flat(place[0], b === 2 ? 0 : place[1]);
     line(context, [[x, y - 4], [x, y + 4]], COLOUR.soft, 2);
-    words(context, name, x, y + 17, COLOUR.soft, "center", 11);
+    words(context, b === 2 ? name : name[0].toUpperCase(), x + (b === 2 ? 0 : 8), y + (b === 2 ? 17 : 14), COLOUR.soft, "center", 11);
   }
 }
 

@@ -18,7 +18,7 @@ function banner(id, text) {
 }
 
 const percent = (share) => (share === null ? "-" : `${(100 * share).toFixed(0)} %`);
-const theta = (values) => live.parts.learning.params.map((p, i) => `${p.symbol} ${short(values[i])} ${p.unit}`);
+const theta = (values) => live.parts.learning.params.map((p, i) => `${p.symbol}  ${short(values[i])} ${p.unit}`);
 
 // ---- news
 
@@ -101,7 +101,8 @@ function showTracking(v) {
 
 function showNoVehicle(now) {
   const replay = now.replay;
-  put("phase", replay ? replay.phase : now.in_process ? "simulating" : "not connected", now.in_process ? "" : "bad");
+  const lost = !now.in_process && Boolean(live.moment);
+  put("phase", replay ? replay.phase : now.in_process ? "simulating" : lost ? "not connected" : "preparing", lost ? "bad" : "");
   put("rule", replay ? `replay of rollout ${replay.number}, a quarter of the speed` : "");
   put("battery", replay && replay.battery_V !== null ? `${replay.battery_V.toFixed(2)} V` : "-");
   put("battery-note", replay ? "simulated" : "");
@@ -115,7 +116,7 @@ function showPose(moment, note) {
   const q = moment.q_WB, tilt = q ? Math.acos(Math.min(Math.max(1 - 2 * (q[0] ** 2 + q[1] ** 2), -1), 1)) * 180 / Math.PI : null;
   const rows = [["to the surface", p[0] === null ? "-" : `${gap.toFixed(2)} m`], ["height", p[0] === null ? "-" : `${p[2].toFixed(2)} m`],
     ["tilt", tilt === null ? "-" : `${tilt.toFixed(0)}°`], ["RREV", moment.cues.rrev_per_s === null ? "-" : `${short(moment.cues.rrev_per_s)} 1/s`],
-    ["position known to", note || "-"]];
+    ["position", note || "-"]];
   const box = $("pose");
   if (box.children.length !== 2 * rows.length) {
     box.replaceChildren(...rows.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));
@@ -127,7 +128,7 @@ function showPose(moment, note) {
 
 function showLearning(learning) {
   put("flights", `${learning.n_flown} / ${learning.n_all}`);
-  put("flights-note", "rollouts that count, of the budget");
+  put("flights-note", "that count, of the budget");
   put("landed", learning.n_flown ? percent(learning.n_landed / learning.n_flown) : "-");
   put("landed-note", `${learning.n_landed} of ${learning.n_flown} on four legs`);
   const box = $("search"), n = Math.min(learning.params.length, 4);
@@ -144,7 +145,7 @@ function showLearning(learning) {
 function showNext(learning) {
   const up = live.parts.upcoming, next = learning.next;
   put("next-title", next ? `Next policy: rollout ${next.number} of ${learning.n_all}` : "Next policy");
-  put("next", next ? theta(next.theta).join("   ") : learning.n_flown >= learning.n_all ? "all flown" : "being chosen");
+  put("next", next ? theta(next.theta).join("\n") : learning.n_flown >= learning.n_all ? "all flown" : "being chosen");
   const belongs = up && next && up.number === next.number;
   put("next-note", belongs ? `simulator: ${up.n_landed} of ${up.n} land, ${up.n_strikes} strike the surface with body or rotors` : "");
 }
@@ -171,17 +172,18 @@ function showBelief(belief) {
 }
 
 function showLanding(landing) {
-  const recorded = Boolean(landing.recorded);
+  $("has-recorded").hidden = !landing.recorded;
   put("last-note", `rollout ${landing.number}`);
   put("verdict", landing.verdict);
   $("verdict").className = /^[34] feet/.test(landing.verdict) ? "good" : "bad";
   plotFlight($("pitch"), "nose up (deg)", landing, "pitch_deg");
   plotFlight($("gap"), "to the surface (m)", landing, "gap_m");
-  const rows = [["", recorded ? "recorded" : "flown", "simulated"], ["outcome", landing.verdict, landing.simulated_verdict]];
+  const rows = [["", "flown", "simulated"], ["outcome", landing.verdict, landing.simulated_verdict]];
   for (const [name, key, unit] of [["distance at the trigger", "d_m", "m"], ["RREV there", "rrev_per_s", "1/s"], ["climb there", "vz_mps", "m/s"]]) {
     rows.push([name, ...[landing.at_trigger, landing.simulated_at_trigger].map((told) => `${short(told[key])} ${unit}`)]);
   }
-  $("at-trigger").replaceChildren(...rows.map((cells) => {
+  const simulatedAlone = live.parts.now && live.parts.now.in_process;
+  $("at-trigger").replaceChildren(...rows.map((cells) => (simulatedAlone ? cells.slice(0, 2) : cells)).map((cells) => {
     const row = document.createElement("tr");
     row.append(...cells.map((text, i) => Object.assign(document.createElement(i ? "td" : "th"), { textContent: text })));
     return row;
@@ -206,6 +208,7 @@ $("stop").addEventListener("click", async () => {
 function draw() {
   live.drawn.side = drawRoom($("side"), live.parts.room, live.moment, live.trail, [0, 2]);
   live.drawn.top = drawRoom($("top"), live.parts.room, live.moment, live.trail, [0, 1]);
+  drawClose($("close"), live.parts.room, live.moment);
   const age_s = (performance.now() - live.seen) / 1000;
   const over = live.parts.now && /^(over|ended)/.test(live.parts.now.stage);
   banner("stale", age_s < STALE_S ? "" : over ? "The run is over. This is its last news." : `No news for ${age_s.toFixed(0)} s: look at the terminal`);

@@ -6,7 +6,8 @@ const EDGE = { left: 46, right: 8, top: 17, bottom: 16 };
 // Numbers as people want to read them.
 function short(value) {
   const size = Math.abs(value);
-  return value === null || !Number.isFinite(value) ? "-" : size >= 100 ? value.toFixed(0) : size >= 10 ? value.toFixed(1) : value.toFixed(2);
+  if (value === null || !Number.isFinite(value)) return "-";
+  return String(size === 0 || size >= 100 ? Math.round(value) : size >= 10 ? value.toFixed(1) : size >= 0.1 ? value.toFixed(2) : value.toPrecision(2));
 }
 
 function frame(canvas, title, [x0, x1], [y0, y1]) {
@@ -27,15 +28,24 @@ function dot(context, [x, y], colour) {
   context.fill();
 }
 
+// The part of a parameter's bounds in which the search has been.
+function searched(learning, i, [lo, hi]) {
+  const values = learning.episodes.flatMap(({ mu, sigma }) => [mu[i] - 2 * sigma[i], mu[i] + 2 * sigma[i]]);
+  const all = [...values, ...(learning.flights.theta[i] || [])];
+  if (!all.length) return [lo, hi];
+  const least = Math.min(...all), most = Math.max(...all), room = 0.1 * (most - least) + 0.01 * (hi - lo);
+  return [Math.max(least - room, lo), Math.min(most + room, hi)];
+}
+
 // Search of one parameter over the flights.
 function plotSearch(canvas, learning, i) {
   const param = learning.params[i], n = Math.max(learning.n_all, 1);
-  const { context, at } = frame(canvas, `${param.symbol} (${param.unit})`, [0, n], param.bounds);
+  const { context, at } = frame(canvas, `${param.symbol} (${param.unit})`, [0, n], searched(learning, i, param.bounds));
+  const clip = (value) => Math.min(Math.max(value, param.bounds[0]), param.bounds[1]);
   let flown = 0;
   const upper = [], lower = [], middle = [];
   for (const episode of learning.episodes) {
     flown += episode.n_scored;
-    const clip = (value) => Math.min(Math.max(value, param.bounds[0]), param.bounds[1]);
     middle.push(at(flown, episode.mu[i]));
     upper.push(at(flown, clip(episode.mu[i] + 2 * episode.sigma[i])));
     lower.push(at(flown, clip(episode.mu[i] - 2 * episode.sigma[i])));
@@ -51,7 +61,7 @@ function plotSearch(canvas, learning, i) {
   flights.theta.length && flights.theta[i].forEach((value, k) => dot(context, at(k + 1, value), flights.landed[k] ? "#2fc08d" : "#ff6b4a"));
 }
 
-// Landing rate of each episode, in per cent, and what a belief expects.
+// Landing rate of each episode, in per cent.
 function plotRate(canvas, learning) {
   const { context, at } = frame(canvas, "landing rate of an episode (%)", [0, Math.max(learning.n_all, 1)], [0, 100]);
   let flown = 0;
