@@ -347,12 +347,12 @@ $(BIN)/python:
 
 $(VENV)/.stamp-run: $(BIN)/python pyproject.toml tools/constraints.txt
 	$(say) 'setup: installing ivl and what it needs'
-	@$(pip) --editable '.[link,sweep,report]'
+	@$(pip) --editable '.[link,sweep,report,live]'
 	@touch $@
 
 $(VENV)/.stamp-dev: $(VENV)/.stamp-run
 	$(say) 'setup: installing what tests and lint need'
-	@$(pip) --editable '.[link,sweep,report,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
+	@$(pip) --editable '.[link,sweep,report,live,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
 	@touch $@
 
 $(UNITY)/unity.c: tools/get_unity.sh tools/unity.txt | $(BIN)/python

@@ -14,6 +14,7 @@ from scipy.special import expit, logit
 
 from ivl import experiment, family, run
 from ivl.belief import bank, correction, decide, emulator, posterior, recording
+from ivl.belief.changes import most_changed
 from ivl.belief.posterior import Belief, Evidence, Trust
 from ivl.belief.recording import Flight
 from ivl.belief.simulator import Simulator
@@ -555,8 +556,8 @@ def test_the_parameters_that_changed_most_are_drawn() -> None:
     after = before.copy()
     after[3] += 5.0
     after[7] *= 0.1
-    assert belief_picture.most_changed(np.array([before, after]))[:2] == [3, 7]
-    assert len(belief_picture.most_changed(np.array([before, after]))) == 6
+    assert most_changed(np.array([before, after]))[:2] == [3, 7]
+    assert len(most_changed(np.array([before, after]))) == 6
 
 
 def test_failures_that_are_expected_are_those_of_the_flights_that_are_left() -> None:
