@@ -31,6 +31,7 @@
     LIVE(F32, sil, wall_x,      N, THE.set.sim.wall_x_m, numbers_written) \
     LIVE(F32, sil, wall_y,      N, THE.set.sim.wall_y_m, numbers_written) \
     LIVE(F32, sil, vbat,        N, THE.set.sim.vbat_V, numbers_written) \
+    LIVE(F32, sil, cell,        N, THE.set.sim.cell_V, numbers_written) \
     LIVE(U8,  sil, pose_source, N, THE.set.sim.pose_source, estimation_written) \
     LIVE(U8,  sil, auto_arm,    N, THE.supervisor.auto_arm, NULL) \
     \

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ivl import experiment, links, margin, run
-from ivl.cli import console, policy_options, site_options
+from ivl.cli import console, live_options, policy_options, site_options
 from ivl.errors import ConfigError, IvlError
 from ivl.experiment import Experiment
 from ivl.links.options import Options
@@ -17,6 +17,8 @@ from ivl.site import require
 
 if TYPE_CHECKING:
     from ivl.links.operators import Operator
+    from ivl.live.board import Board
+    from ivl.rehearsal.script import Script
 
 HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
 
@@ -46,6 +48,8 @@ Examples:
       ivl sil --experiment experiments/paper_vertical.yaml
   ivl learn experiments/paper_flight.yaml --site lab.yaml --rehearse
       a day in the room of lab.yaml (ivl site new), with a software vehicle as if it were a drone
+  ivl learn experiments/paper_flight.yaml --site lab.yaml --rehearse --live
+      the same, shown in a browser, with a button that stops the vehicle; see docs/LIVE.md
   ivl learn experiments/paper_flight.yaml --site lab.yaml --uri site
       the drone there; see docs/HARDWARE.md, docs/SITE.md and docs/HOST.md first
   ivl learn experiments/paper_vertical.yaml --policy g.yaml
@@ -91,39 +95,53 @@ def learn(
     mocap: Annotated[
         str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
     ] = None,
+    script: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="What goes wrong on a rehearsed day: a file, default, or calm."),
+    ] = None,
     answers: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Answers of a rehearsal's operator, one a line.")
+        str | None,
+        typer.Option(metavar="FILE", help="Answers of a rehearsal's operator, one a line; or script: it answers."),
     ] = None,
     other_world: Annotated[
         bool, typer.Option("--other-world", help="Also fly a software vehicle that simulates another world.")
     ] = False,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
+    live: live_options.Live = False,
+    live_at: live_options.LiveAt = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
 ) -> None:
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume, site)
-    uri = require.link_of(chosen, uri) or (f"{links.REHEARSAL_SCHEME}://" if rehearse else None)
+    uri = require.link_of(chosen, uri, site if path is None else None) or (
+        f"{links.REHEARSAL_SCHEME}://" if rehearse else None
+    )
     if uri is not None:
         require.for_flight(chosen, uri, rehearse)
     folder = out or run.default_folder(chosen, n_trials, resume)
     hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage, _bank, _drone, _note)
-    flight = Options(
-        mocap=site_options.tracker(chosen, uri, mocap, rehearse),
-        rehearse=rehearse,
-        operator=_operator(answers, rehearse),
-        other_world=other_world,
-        start_hint=_start_hint(path or str(folder / "config.yaml"), _said(settings, site), uri or ""),
-        say=console.say,
-    )
-    try:
-        result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight, earlier or [])
-    except KeyboardInterrupt:
-        words = ["ivl", "learn", "--resume", "--out", str(folder)]
-        words += ["--uri", uri] if uri and not uri.startswith(links.REHEARSAL_SCHEME) else []
-        words += ["--mocap", mocap] if mocap else []
-        words += ["--rehearse"] if rehearse else []
-        console.say(f"interrupted; continue with: {shlex.join([*words, *(['--other-world'] if other_world else [])])}")
-        raise
+    with live_options.shown(chosen, folder, uri, live, live_at) as board:
+        flight = Options(
+            mocap=site_options.tracker(chosen, uri, mocap, rehearse),
+            rehearse=rehearse,
+            operator=_operator(answers, rehearse, board if links.is_vehicle(uri) else None),
+            script=_script(script, uri),
+            answered_by_script=_answers_itself(answers, rehearse, uri),
+            other_world=other_world,
+            start_hint=_start_hint(path or str(folder / "config.yaml"), _said(settings, site), uri or ""),
+            say=console.say,
+            observer=live_options.observer(board),
+        )
+        hooks = live_options.told(hooks, board)
+        try:
+            result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight, earlier or [])
+        except KeyboardInterrupt:
+            words = ["ivl", "learn", "--resume", "--out", str(folder)]
+            words += ["--uri", uri] if uri and not uri.startswith(links.REHEARSAL_SCHEME) else []
+            words += ["--mocap", mocap] if mocap else []
+            words += [word for word, said in (("--rehearse", rehearse), ("--other-world", other_world)) if said]
+            console.say(f"interrupted; continue with: {shlex.join(words)}")
+            raise
     pictures, failure = _draw(result) if n_trials is None else ([], None)
     if as_json:
         console.print_json(result.summary)
@@ -133,19 +151,63 @@ def learn(
         raise failure
 
 
-def _operator(answers: Path | None, rehearse: bool) -> "Operator | None":
-    """The operator of a rehearsal whose answers are in a file; None: asked at the terminal.
+_BY_SCRIPT = "script"
+"""What `--answers` says for a rehearsal whose script answers."""
+
+
+def _script(name: str | None, uri: str | None) -> "Script | None":
+    """What goes wrong on a rehearsed day; None: it is none with a vehicle of its own.
+
+    Raises:
+        ConfigError: There is no such script, or nothing that it could happen to.
+    """
+    if not _is_own(uri):
+        if name is not None:
+            raise ConfigError(f"--script {name}: a script is for a rehearsal (--rehearse) without --uri")
+        return None
+    from ivl.rehearsal import script as scripts  # its modules load much of the links
+
+    return scripts.load(name or scripts.DEFAULT)
+
+
+def _is_own(uri: str | None) -> bool:
+    """Whether a rehearsal starts its software vehicle itself."""
+    return uri is not None and uri.startswith(links.REHEARSAL_SCHEME)
+
+
+def _answers_itself(answers: str | None, rehearse: bool, uri: str | None) -> bool:
+    """Whether the script answers, and not a person.
+
+    Raises:
+        ConfigError: There is no script that could.
+    """
+    if answers != _BY_SCRIPT:
+        return False
+    if not (rehearse and _is_own(uri)):
+        raise ConfigError("--answers script: only a rehearsal (--rehearse) without --uri has a script that answers")
+    return True
+
+
+def _operator(answers: str | None, rehearse: bool, board: "Board | None") -> "Operator | None":
+    """The operator at the terminal, or of a rehearsal whose answers are in a file; None: nobody special.
+
+    Args:
+        answers: The file.
+        rehearse: Whether it is a rehearsal.
+        board: Shows what is asked; None: nobody does.
 
     Raises:
         ConfigError: It is no rehearsal, or the file cannot be read.
     """
-    if answers is None:
+    if answers == _BY_SCRIPT or (answers is None and board is None):
         return None
-    if not rehearse:
+    if answers is not None and not rehearse:
         raise ConfigError(f"--answers {answers}: only a rehearsal (--rehearse) is answered from a file")
-    from ivl.links.operators import ConsoleOperator, answers_of  # its modules load cflib
+    from ivl.links import operators  # its modules load cflib
 
-    return ConsoleOperator(countdown_s=0, read=answers_of(answers))
+    read = operators.read_line if answers is None else operators.answers_of(Path(answers))
+    countdown_s = operators.COUNTDOWN_S if answers is None else 0
+    return operators.ConsoleOperator(console.err, countdown_s, read if board is None else board.reader(read))
 
 
 def _said(settings: list[str] | None, site: str | None) -> list[str]:
@@ -173,10 +235,10 @@ def _choose(
         raise ConfigError(
             "EXPERIMENT is missing (only `--resume --out FOLDER` goes without); see: ivl list experiments"
         )
-    if settings or learner or policy_file or site or seed is not None or trials is not None:
+    if settings or learner or policy_file or seed is not None or trials is not None:
         raise ConfigError(
             "--resume without EXPERIMENT takes all from the run folder: "
-            "leave out --set, --learner, --policy, --site, --seed and --trials"
+            "leave out --set, --learner, --policy, --seed and --trials"
         )
     return run.read_config(out)
 
@@ -241,16 +303,36 @@ def _lines_of_one(result: run.RunResult) -> list[tuple[str, str]]:
     summary, experiment = result.summary, result.experiment
     found = zip(experiment.policy.shape.params, summary["mu"], summary["sigma"], strict=True)
     reached = summary["rollouts_to_convergence"]
+    flown = summary.get("flown")
+    by = " (judged by the simulator)" if flown else ""
     return [
-        ("solved", f"yes, after {reached} rollouts" if summary["solved"] else "no"),
+        *([] if flown is None else _lines_of_flown(flown)),
+        ("solved", (f"yes, after {reached} rollouts" if summary["solved"] else "no") + by),
         *((p.symbol, f"{mu:.2f} ± {sigma:.2f} {p.unit}") for p, mu, sigma in found),
         ("landing rate, last three episodes", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
-        ("of the recommended policy", _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"])),
+        (
+            "of the recommended policy" + (", simulated" if flown else ""),
+            _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"]),
+        ),
         *margin.lines(summary["margin"], result.best, experiment),
         *([] if summary["model_fits"] is None else [("model", console.MODEL_FITS[summary["model_fits"]])]),
         ("failed landings until convergence", str(summary["failed_landings"])),
         ("failed landings in all", f"{summary['failed_landings_total']} of {summary['rollouts']} rollouts"),
     ]
+
+
+def _lines_of_flown(flown: dict[str, Any]) -> list[tuple[str, str]]:
+    """What the vehicle has flown, before anything that is simulated."""
+    interval = f"95 %: {console.percent(flown['rate_lo'])} .. {console.percent(flown['rate_hi'])}"
+    lines = [
+        ("flown: landed on four legs", f"{flown['landed']} of {flown['landings']} ({console.percent(flown['rate'])}, "
+                                       f"{interval}); simulated, the same policies: "
+                                       f"{console.percent(flown['simulated_rate'])}"),
+    ]  # fmt: skip
+    if flown["pitch_rms_deg_median"] is not None:
+        text = f"pitch {flown['pitch_rms_deg_median']:.1f} deg rms, median of the flips"
+        lines.append(("recorded against simulated", text))
+    return lines
 
 
 def _lines_of_trials(summary: dict[str, Any]) -> list[tuple[str, str]]:

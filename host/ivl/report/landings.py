@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from ivl import shapes
 from ivl.landing import LandingSpec
 from ivl.report import replay
 from ivl.rewards import RewardChoice
-from ivl.world import World
+from ivl.world import Trace, World
 
 Key = tuple[Any, ...]
 
@@ -45,6 +46,12 @@ class Album:
         self.landings.append({"label": label, "geometry": self._names[_key(spec)], **packed})
         return len(self.landings) - 1
 
+    def show(self, spec: LandingSpec, trace: Trace, label: str) -> int:
+        """Take a landing as it is, recorded or simulated, and return its number; `label` says which it is."""
+        packed = replay.pack(spec, self._world(spec), trace, self.reward)
+        self.landings.append({"label": label, "geometry": self._names[_key(spec)], **packed})
+        return len(self.landings) - 1
+
     def fact(self) -> list[str]:
         """A line for the page's header: how many, and whether they are what was flown."""
         n = len(self.landings)
@@ -55,7 +62,7 @@ class Album:
         key = _key(spec)
         if key not in self._worlds:
             world = self._worlds[key] = spec.make_world()
-            self._names[key] = self._name_of(f"{spec.vehicle}/{spec.gear_set}/{spec.gear}", replay.geometry(world))
+            self._names[key] = self._name_of(f"{spec.vehicle}/{spec.gear_set}/{spec.gear}", shapes.geometry(world))
         return self._worlds[key]
 
     def _name_of(self, name: str, shapes: dict[str, Any]) -> str:
