@@ -181,7 +181,7 @@
     HELD(F32, ctrlMel, kd_z, CP, 0.4f) \
     HELD(F32, ctrlMel, ki_z, CP, 0.05f) \
     HELD(F32, ctrlMel, i_range_z, P, 0.4f) \
-    HELD(F32, ctrlMel, mass,       CP, 0.029f) \
+    HELD(F32, ctrlMel, mass,       CP, 0.0325f) \
     HELD(F32, ctrlMel, massThrust, CP, 132000.0f) \
     HELD(F32, ctrlMel, kR_xy, CP, 70000.0f) \
     HELD(F32, ctrlMel, kR_z,  CP, 60000.0f) \
@@ -205,7 +205,7 @@
     HELD(U8,  locSrv, enLhMtchStm,       C, 0) \
     HELD(U8,  locSrv, maxTimeLhMtchStm,  C, 25) \
     HELD(U8,  locSrv, minBsLhMtchStm,    C, 2) \
-    HELD(U8,  lighthouse, method,       C, 0) \
+    HELD(U8,  lighthouse, method,       C, 1) \
     HELD(U8,  lighthouse, bsCalibReset, C, 0) \
     HELD(U8,  lighthouse, systemType,   C, 2) \
     HELD(U16, lighthouse, bsAvailable,  CR, 0) \
@@ -283,7 +283,7 @@
     HELD(U8,  activeMarker, back,  CP, 3) \
     HELD(U8,  activeMarker, left,  CP, 4) \
     HELD(U8,  activeMarker, right, CP, 2) \
-    HELD(U8,  activeMarker, mode,  CP, 1)
+    HELD(U8,  activeMarker, mode,  CP, 3)
 
 // ---- LIVE(type, group, name, access, value)   HELD(type, group, name, access, value)
 // with the vehicle cf, its input in, what follows from it e and the truth kin

@@ -14,6 +14,7 @@ from scipy.special import expit, logit
 
 from ivl import experiment, family, run
 from ivl.belief import bank, correction, decide, emulator, posterior, recording
+from ivl.belief.changes import most_changed
 from ivl.belief.posterior import Belief, Evidence, Trust
 from ivl.belief.recording import Flight
 from ivl.belief.simulator import Simulator
@@ -61,7 +62,13 @@ def belief_of(
 class Even(emulator.LandingEmulator):
     """A landing emulator that knows nothing."""
 
-    def rate(self, z: np.ndarray, theta: np.ndarray, conditions: np.ndarray) -> np.ndarray:  # noqa: ARG002
+    def rate(
+        self,
+        z: np.ndarray,
+        theta: np.ndarray,  # noqa: ARG002
+        conditions: np.ndarray,  # noqa: ARG002
+        recorded: np.ndarray | None = None,  # noqa: ARG002
+    ) -> np.ndarray:
         return np.full(len(z), 0.5)
 
 
@@ -91,6 +98,19 @@ def test_a_flight_without_a_trigger_records_nothing(kin: Family) -> None:
     features, outcome = recording.simulated(kin.world, never, np.array([20.0, 5.0]), seed=3, stream=0)
     assert not outcome["triggered"][0]
     assert np.isnan(features).all()
+
+
+def test_a_flight_of_many_approaches_names_its_own(kin: Family) -> None:
+    many = replace(FLIGHT, approaches=np.array([[1.5, 3.5], [30.0, 90.0]]))
+    assert many.box.shape == (4, 2)
+    own, outcome = recording.simulated(kin.world, many, np.array([4.5, 8.0, 2.0, 60.0]), seed=3, stream=0)
+    one = replace(FLIGHT, speed_mps=2.0, angle_deg=60.0)
+    same, expected = recording.simulated(kin.world, one, np.array([4.5, 8.0]), seed=3, stream=0)
+    assert np.array_equal(own, same, equal_nan=True)
+    assert outcome.tobytes() == expected.tobytes()
+    flown = bank.make(kin, many, 6, 3, seed=5)
+    assert flown.theta.shape == (6, 3, 4)
+    assert (np.ptp(flown.theta.reshape(-1, 4), axis=0) > 0.3 * np.ptp(many.box, axis=1)).all()
 
 
 def test_the_gyro_clips_what_is_recorded(kin: Family) -> None:
@@ -338,7 +358,7 @@ def test_the_margin_is_an_average_over_the_box_of_errors() -> None:
 class Window:
     """A belief of one landing window: lands between two thresholds, better with a larger moment up to 8 N mm."""
 
-    def rates(self, theta: np.ndarray) -> np.ndarray:
+    def rates(self, theta: np.ndarray, n_most: int = 1) -> np.ndarray:  # noqa: ARG002
         r, m = theta[:, 0], theta[:, 1]
         inside = expit((r - 3.8) * 40) * expit((4.4 - r) * 40)
         return (inside * np.where(m < 8.0, m / 8.0, 1.0))[None]
@@ -536,8 +556,8 @@ def test_the_parameters_that_changed_most_are_drawn() -> None:
     after = before.copy()
     after[3] += 5.0
     after[7] *= 0.1
-    assert belief_picture.most_changed(np.array([before, after]))[:2] == [3, 7]
-    assert len(belief_picture.most_changed(np.array([before, after]))) == 6
+    assert most_changed(np.array([before, after]))[:2] == [3, 7]
+    assert len(most_changed(np.array([before, after]))) == 6
 
 
 def test_failures_that_are_expected_are_those_of_the_flights_that_are_left() -> None:

@@ -6,23 +6,16 @@ from typing import Any
 
 import policies
 import pytest
+from browsing import DEADLINE_MS, browsing
 
 import ivl  # isort: split
 
-from playwright.sync_api import Browser, Page, Request, Route, sync_playwright
+from playwright.sync_api import Browser, Page, Request, Route
 
 from ivl import cli, experiment, report, run
 from ivl.landing import LandingSpec
 from ivl.policy import file
 from ivl.sweep import config, folder, plan, store, work
-
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = (
-    "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
-    "--disable-sync --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader"
-)
-
-DEADLINE_MS = 240_000  # for a machine that is busy; nothing is judged by it
 
 SMALL = {
     "name": "small",
@@ -105,13 +98,8 @@ def policy_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    assert CHROMIUM.exists(), f"{CHROMIUM} is missing: run the tests by `make test-report`, which installs it"
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=str(CHROMIUM), headless=True, args=FLAGS.split(), timeout=DEADLINE_MS
-        )
-        yield browser
-        browser.close()
+    with browsing() as opened:
+        yield opened
 
 
 class Visit:

@@ -18,7 +18,7 @@ from planes import MOVING, NORMALS
 import ivl
 from ivl import export, landing, tracefile
 from ivl.errors import ConfigError
-from ivl.export import Format, csv_file, flight, mcap_file
+from ivl.export import Format, csv_file, flight, topics
 from ivl.export.source import Choice, resolve
 from ivl.landing import LandingSpec
 from ivl.sweep import store
@@ -92,7 +92,7 @@ def test_every_message_fits_the_schema_that_the_file_carries(mcap: Path) -> None
             assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
             check(json.loads(schema.data), json.loads(message.data), channel.topic)
             seen[channel.topic] = schema.name
-    assert seen == mcap_file.TOPICS
+    assert seen == topics.TOPICS
 
 
 TYPES = {
@@ -128,7 +128,7 @@ def test_the_file_tells_what_was_flown_and_what_came_out(mcap: Path, spec: Landi
 def test_a_number_that_is_none_becomes_null(flown: flight.Flight) -> None:
     columns = {**flown.columns, "rrev_per_s": np.full(len(flown), np.nan)}
     broken = flight.Flight("x", columns, flown.phase, flown.world)
-    states = [message for _, topic, message in mcap_file.messages(broken) if topic == "/ivl/state"]
+    states = [message for _, topic, message in topics.messages(broken) if topic == "/ivl/state"]
     assert {state["rrev_per_s"] for state in states} == {None}
 
 
@@ -215,7 +215,7 @@ def test_the_foxglove_layout_shows_topics_and_fields_that_exist(mcap: Path) -> N
     assert {path.split(".")[0] for path in paths} == {"/ivl/state"}
     assert {path.split(".")[1] for path in paths} <= fields
     scene = layout["configById"]["3D!landing"]
-    assert set(scene["topics"]) <= set(mcap_file.TOPICS)
+    assert set(scene["topics"]) <= set(topics.TOPICS)
     assert scene["followTf"] == "body"
 
 

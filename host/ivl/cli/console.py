@@ -4,8 +4,11 @@ Both consoles print text as it is: no path, name or message of a user is markup.
 `rich.text.Text`.
 """
 
+import io
 import json
-from collections.abc import Iterable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -17,13 +20,56 @@ from ivl.check import Check
 from ivl.forms import Form
 from ivl.learning.loop import Progress
 
+Heard = Callable[[str], None]
+
+
+class _Stderr(io.TextIOBase):
+    """Standard error as it is at the moment, and whoever listens to it."""
+
+    heard: Heard | None = None
+
+    def write(self, text: str) -> int:
+        """Write through."""
+        if self.heard is not None:
+            self.heard(text)
+        return sys.stderr.write(text)
+
+    def flush(self) -> None:
+        """Flush through."""
+        sys.stderr.flush()
+
+    def isatty(self) -> bool:
+        """Whether people read it."""
+        return sys.stderr.isatty()
+
+    def fileno(self) -> int:
+        """Its descriptor."""
+        return sys.stderr.fileno()
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        """Its encoding."""
+        return sys.stderr.encoding
+
+
+_STDERR = _Stderr()
 _LITERAL: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False, "soft_wrap": True}
 out = Console(**_LITERAL)
-err = Console(stderr=True, **_LITERAL)
+err = Console(file=_STDERR, **_LITERAL)
 
 _SHOWN_MAX = 4  # parameters in a line of progress
 MODEL_FITS = {True: "model fits", False: "NO MODEL FITS", None: "no model"}
 """Words for `ivl.learners.base.Learner.insight`'s `model_fits`."""
+
+
+@contextmanager
+def overheard(heard: Heard) -> Iterator[None]:
+    """Let somebody hear all that `err` prints; a line that has no end yet too."""
+    before, _STDERR.heard = _STDERR.heard, heard
+    try:
+        yield
+    finally:
+        _STDERR.heard = before
 
 
 def say(text: str) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ivl import experiment, links, margin, run
-from ivl.cli import console, policy_options, site_options
+from ivl.cli import console, live_options, policy_options, site_options
 from ivl.errors import ConfigError, IvlError
 from ivl.experiment import Experiment
 from ivl.links.options import Options
@@ -17,6 +17,7 @@ from ivl.site import require
 
 if TYPE_CHECKING:
     from ivl.links.operators import Operator
+    from ivl.live.board import Board
     from ivl.rehearsal.script import Script
 
 HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
@@ -47,6 +48,8 @@ Examples:
       ivl sil --experiment experiments/paper_vertical.yaml
   ivl learn experiments/paper_flight.yaml --site lab.yaml --rehearse
       a day in the room of lab.yaml (ivl site new), with a software vehicle as if it were a drone
+  ivl learn experiments/paper_flight.yaml --site lab.yaml --rehearse --live
+      the same, shown in a browser, with a button that stops the vehicle; see docs/LIVE.md
   ivl learn experiments/paper_flight.yaml --site lab.yaml --uri site
       the drone there; see docs/HARDWARE.md, docs/SITE.md and docs/HOST.md first
   ivl learn experiments/paper_vertical.yaml --policy g.yaml
@@ -104,6 +107,8 @@ def learn(
         bool, typer.Option("--other-world", help="Also fly a software vehicle that simulates another world.")
     ] = False,
     threads: Annotated[int | None, typer.Option(help="Worker threads; default: all processors.", min=1)] = None,
+    live: live_options.Live = False,
+    live_at: live_options.LiveAt = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
 ) -> None:
     """Learn to land; HELP is the text that people see."""
@@ -115,25 +120,28 @@ def learn(
         require.for_flight(chosen, uri, rehearse)
     folder = out or run.default_folder(chosen, n_trials, resume)
     hooks = run.Hooks(_announce, partial(console.print_episode, form=chosen.policy.shape), _stage, _bank, _drone, _note)
-    flight = Options(
-        mocap=site_options.tracker(chosen, uri, mocap, rehearse),
-        rehearse=rehearse,
-        operator=_operator(answers, rehearse),
-        script=_script(script, uri),
-        answered_by_script=_answers_itself(answers, rehearse, uri),
-        other_world=other_world,
-        start_hint=_start_hint(path or str(folder / "config.yaml"), _said(settings, site), uri or ""),
-        say=console.say,
-    )
-    try:
-        result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight, earlier or [])
-    except KeyboardInterrupt:
-        words = ["ivl", "learn", "--resume", "--out", str(folder)]
-        words += ["--uri", uri] if uri and not uri.startswith(links.REHEARSAL_SCHEME) else []
-        words += ["--mocap", mocap] if mocap else []
-        words += ["--rehearse"] if rehearse else []
-        console.say(f"interrupted; continue with: {shlex.join([*words, *(['--other-world'] if other_world else [])])}")
-        raise
+    with live_options.shown(chosen, folder, uri, live, live_at) as board:
+        flight = Options(
+            mocap=site_options.tracker(chosen, uri, mocap, rehearse),
+            rehearse=rehearse,
+            operator=_operator(answers, rehearse, board if links.is_vehicle(uri) else None),
+            script=_script(script, uri),
+            answered_by_script=_answers_itself(answers, rehearse, uri),
+            other_world=other_world,
+            start_hint=_start_hint(path or str(folder / "config.yaml"), _said(settings, site), uri or ""),
+            say=console.say,
+            observer=live_options.observer(board),
+        )
+        hooks = live_options.told(hooks, board)
+        try:
+            result = run.run(chosen, folder, n_trials, resume, threads, hooks, uri, flight, earlier or [])
+        except KeyboardInterrupt:
+            words = ["ivl", "learn", "--resume", "--out", str(folder)]
+            words += ["--uri", uri] if uri and not uri.startswith(links.REHEARSAL_SCHEME) else []
+            words += ["--mocap", mocap] if mocap else []
+            words += [word for word, said in (("--rehearse", rehearse), ("--other-world", other_world)) if said]
+            console.say(f"interrupted; continue with: {shlex.join(words)}")
+            raise
     pictures, failure = _draw(result) if n_trials is None else ([], None)
     if as_json:
         console.print_json(result.summary)
@@ -180,19 +188,26 @@ def _answers_itself(answers: str | None, rehearse: bool, uri: str | None) -> boo
     return True
 
 
-def _operator(answers: str | None, rehearse: bool) -> "Operator | None":
-    """The operator of a rehearsal whose answers are in a file; None: asked at the terminal.
+def _operator(answers: str | None, rehearse: bool, board: "Board | None") -> "Operator | None":
+    """The operator at the terminal, or of a rehearsal whose answers are in a file; None: nobody special.
+
+    Args:
+        answers: The file.
+        rehearse: Whether it is a rehearsal.
+        board: Shows what is asked; None: nobody does.
 
     Raises:
         ConfigError: It is no rehearsal, or the file cannot be read.
     """
-    if answers is None or answers == _BY_SCRIPT:
+    if answers == _BY_SCRIPT or (answers is None and board is None):
         return None
-    if not rehearse:
+    if answers is not None and not rehearse:
         raise ConfigError(f"--answers {answers}: only a rehearsal (--rehearse) is answered from a file")
-    from ivl.links.operators import ConsoleOperator, answers_of  # its modules load cflib
+    from ivl.links import operators  # its modules load cflib
 
-    return ConsoleOperator(countdown_s=0, read=answers_of(Path(answers)))
+    read = operators.read_line if answers is None else operators.answers_of(Path(answers))
+    countdown_s = operators.COUNTDOWN_S if answers is None else 0
+    return operators.ConsoleOperator(console.err, countdown_s, read if board is None else board.reader(read))
 
 
 def _said(settings: list[str] | None, site: str | None) -> list[str]:

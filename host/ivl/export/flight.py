@@ -89,7 +89,7 @@ def of_spec(spec: LandingSpec, title: str, reward: RewardChoice | None = None) -
     if reward:
         terms = reward.score(np.array([trace.outcome], dtype=trace.outcome.dtype))
         facts |= {f"reward.{name}": str(float(value[0])) for name, value in terms.items()}
-    return _of_rows(trace.rows, world, title, facts)
+    return of_rows(trace.rows, world, title, facts)
 
 
 def of_file(path: Path, world: World) -> Flight:
@@ -106,10 +106,11 @@ def of_file(path: Path, world: World) -> Flight:
     table = tracefile.read_table(path)
     if "p_x_W_m" in table.columns:
         return _of_recorder(table, path, world)
-    return _of_rows(tracefile.rows_of(table), world, path.name, {"file": path.name})
+    return of_rows(tracefile.rows_of(table), world, path.name, {"file": path.name})
 
 
-def _of_rows(rows: Any, world: World, title: str, facts: dict[str, str]) -> Flight:
+def of_rows(rows: Any, world: World, title: str, facts: dict[str, str]) -> Flight:
+    """The rows of a trace."""
     return Flight(title, tracefile.columns(rows), [world.phase_name(int(code)) for code in rows["phase"]], world, facts)
 
 
@@ -124,12 +125,12 @@ def _of_recorder(table: border.Table, path: Path, world: World) -> Flight:
     d_m = np.where(columns["d_sensed_m"] > 0, columns["d_sensed_m"], np.nan)
     columns["rrev_per_s"] = columns["v_WB_mps_3"] / d_m
     columns["of_y_radps"] = -columns["v_WB_mps_1"] / d_m
-    columns["pitch_deg"] = _nose_up_deg(np.column_stack([columns[f"q_WB_{i}"] for i in (1, 2, 3, 4)]))
+    columns["pitch_deg"] = nose_up_deg(np.column_stack([columns[f"q_WB_{i}"] for i in (1, 2, 3, 4)]))
     phase = [world.phase_name(int(code)) for code in columns["phase"]]
     return Flight(path.name, columns, phase, world, {"file": path.name, "source": "flight recorder"})
 
 
-def _nose_up_deg(q: FloatArray) -> FloatArray:
+def nose_up_deg(q: FloatArray) -> FloatArray:
     """Rotation about b_y, nose up, unwrapped: the direction of b_x in the x-z plane of the world."""
     matrix = rotation(q.T)
     return np.asarray(np.rad2deg(np.unwrap(np.arctan2(matrix[2, 0], matrix[0, 0]))))

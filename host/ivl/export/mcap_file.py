@@ -1,32 +1,13 @@
-"""MCAP: one file with the vehicle in 3-D and every time series, for Foxglove and PlotJuggler.
+"""MCAP: one file with the topics of `ivl.export.topics`, for Foxglove and PlotJuggler."""
 
-    /tf          foxglove.FrameTransforms  body in the world
-    /ivl/pose    foxglove.PoseInFrame      the same as a pose
-    /ivl/scene   foxglove.SceneUpdate      ceiling (again in each row if it moves) and body once, legs in each row
-    /ivl/state   ivl.State                 every column of the trace by name, and the phase in words
-
-Time begins at 0 with the landing; of a file with times below 0, with its first row. Messages are JSON, so that no
-other library is needed to read them.
-"""
-
-import json
-import math
-from collections.abc import Iterator
 from pathlib import Path
 
 from mcap.writer import Writer
 
 import ivl
 from ivl import files
-from ivl.export import scene, schemas
+from ivl.export import schemas, topics
 from ivl.export.flight import Flight
-
-TOPICS = {
-    "/tf": schemas.FRAME_TRANSFORMS,
-    "/ivl/pose": schemas.POSE_IN_FRAME,
-    "/ivl/scene": schemas.SCENE_UPDATE,
-    "/ivl/state": schemas.STATE,
-}
 
 
 def write(flight: Flight, path: Path) -> None:
@@ -35,30 +16,11 @@ def write(flight: Flight, path: Path) -> None:
         writer = Writer(file)
         writer.start(profile="", library=f"ivl {ivl.__version__}")
         channels = {}
-        for topic, name in TOPICS.items():
+        for topic, name in topics.TOPICS.items():
             schema = writer.register_schema(name, "jsonschema", schemas.text(name, flight.columns))
             channels[topic] = writer.register_channel(topic, "json", schema)
-        for number, (t_ns, topic, message) in enumerate(messages(flight)):
-            data = json.dumps(message, separators=(",", ":"), allow_nan=False).encode()
+        for number, (t_ns, topic, message) in enumerate(topics.messages(flight)):
+            data = topics.encoded(message)
             writer.add_message(channels[topic], log_time=t_ns, publish_time=t_ns, sequence=number, data=data)
         writer.add_metadata("landing", {"title": flight.title, **flight.facts})
         writer.finish()  # type: ignore[no-untyped-call]
-
-
-def messages(flight: Flight) -> Iterator[tuple[int, str, scene.Message]]:
-    """(time in ns, topic, message) in the order of time."""
-    times_ns = [round(1e9 * (t - min(flight.t_s[0], 0.0))) for t in flight.t_s]  # MCAP has no time before 0
-    position, attitude = flight.vector("p_WB_m", 3), flight.vector("q_WB", 4)
-    feet, names = flight.feet_W_m, list(flight.columns)
-    hips, radius_m = flight.hips_W_m(), flight.world.params.values["leg.foot_radius"]
-    series = zip(*(column.tolist() for column in flight.columns.values()), strict=True)
-    yield times_ns[0], "/ivl/scene", scene.fixed(flight, times_ns[0])
-    for i, (t_ns, values) in enumerate(zip(times_ns, series, strict=True)):
-        yield t_ns, "/tf", scene.transforms(t_ns, position[i], attitude[i])
-        yield t_ns, "/ivl/pose", scene.pose(t_ns, position[i], attitude[i])
-        if flight.world.surface.moves and i > 0:
-            yield t_ns, "/ivl/scene", scene.ceiling(flight, t_ns, float(flight.t_s[i]))
-        if feet is not None:
-            yield t_ns, "/ivl/scene", scene.legs(t_ns, hips[i], feet[i], flight.feet_stuck[i], radius_m)
-        numbers = {name: value if math.isfinite(value) else None for name, value in zip(names, values, strict=True)}
-        yield t_ns, "/ivl/state", {**numbers, "phase_name": flight.phase[i]}

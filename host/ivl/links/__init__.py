@@ -17,6 +17,11 @@ REHEARSAL_SCHEME = "rehearsal"
 """A software vehicle of its own, flown as a drone."""
 
 
+def is_vehicle(uri: str | None) -> bool:
+    """Whether a vehicle is flown there, a real or a software one; None: the simulator in this process."""
+    return uri is not None and uri.partition("://")[0] in (*VEHICLE_SCHEMES, REHEARSAL_SCHEME)
+
+
 def open_source(
     uri: str,
     experiment: Experiment,

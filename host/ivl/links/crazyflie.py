@@ -222,6 +222,7 @@ class CrazyflieSource:
 
     def _keep(self, landing: Landing) -> None:
         self._note(landing.rollout, "flown", landing)
+        self.options.observer.landed(landing)
         told = self._site.told(landing) if self._site is not None else ""
         if told:
             self.options.say(told)
@@ -272,6 +273,7 @@ class CrazyflieSource:
             raise
         self._vehicle, self._site = vehicle, site
         self.vehicle = vehicle.identity()
+        self.options.observer.connected(vehicle, self._tracking)
         return site
 
     def _frame(self) -> FlightFrame | None:
@@ -323,6 +325,7 @@ class CrazyflieSource:
     def _drop(self) -> None:
         """Forget a connection that is no good any more; the vehicle ends its flight by its own rules."""
         vehicle, self._vehicle, self._site = self._vehicle, None, None
+        self.options.observer.disconnected()
         tracking, self._tracking = self._tracking, None
         if tracking is not None:
             tracking.close()

@@ -21,6 +21,7 @@ from ivl.links.trouble import Cause, Instead, Vetoed, state_of
 from ivl.links.truth import Resting
 
 STOP = "stop"
+COUNTDOWN_S = 3
 _RESUME = "the run can be resumed"
 
 
@@ -147,7 +148,7 @@ class ConsoleOperator:
     """Asks in the terminal; the word `stop` ends the day, at any question."""
 
     def __init__(
-        self, console: Console | None = None, countdown_s: int = 3, read: Callable[[], str] = read_line
+        self, console: Console | None = None, countdown_s: int = COUNTDOWN_S, read: Callable[[], str] = read_line
     ) -> None:
         """Ask on a console.
 

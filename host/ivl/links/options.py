@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ivl.experiment import Experiment
 from ivl.links.deadlines import DEADLINES, Deadlines
+from ivl.links.observer import Nobody, Observer
 from ivl.mocap.config import MocapConfig
 from ivl.site import require
 from ivl.site.file import SiteFile
@@ -41,6 +42,7 @@ class Options:
         answered_by_script: Nobody is asked in such a rehearsal: the script says yes, and sees what came of a landing.
         day: The day that follows from the script; whoever starts the vehicle makes it.
         deadlines: Limits of the link.
+        observer: Who looks on.
     """
 
     folder: Path | None = None
@@ -55,6 +57,7 @@ class Options:
     answered_by_script: bool = False
     day: "Day | None" = None
     deadlines: Deadlines = DEADLINES
+    observer: Observer = Nobody()
 
     def site_of(self, experiment: Experiment, uri: str) -> SiteFile | None:
         """The site file that a flight of an experiment is flown with (as `ivl.site.require.for_flight`)."""

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from ivl.belief import recording
+from ivl.belief.changes import most_changed
 from ivl.experiment import Experiment
 from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
 from ivl.outcome import four_leg
@@ -24,7 +25,6 @@ from ivl.plots import style
 from ivl.run import RunResult
 
 TITLE = "Belief over vehicles: its parameters after each flight, the last flip as expected and as flown, landings"
-_SHOWN = 6  # parameters
 _LABELS = {"pitch": "pitch (deg)", "rate": "rate (rad/s)", "fall": "fall (m)"}
 
 FloatArray = npt.NDArray[np.float64]
@@ -86,15 +86,6 @@ def _draw_parameters(axes: Sequence[Axes], insights: Sequence[dict[str, Any]], f
         axis.set_xlim(0, flights[-1])
     for axis in axes[levels.shape[1] :]:
         axis.remove()
-
-
-def most_changed(levels: FloatArray) -> list[int]:
-    """The parameters whose quantiles, shape (n_times, n_parameters, 5), moved or narrowed most, at most six."""
-    before, after = levels[0], levels[-1]
-    width = np.maximum(before[:, 3] - before[:, 1], np.finfo(np.float64).tiny)
-    moved = np.abs(after[:, 2] - before[:, 2]) / width
-    narrowed = 1.0 - (after[:, 3] - after[:, 1]) / width
-    return [int(i) for i in np.argsort(-(moved + np.maximum(narrowed, 0.0)), kind="stable")[:_SHOWN]]
 
 
 def _draw_flip(axes: Sequence[Axes], insight: dict[str, Any], episode: int, rollouts: RolloutRows) -> None:

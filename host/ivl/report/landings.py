@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from ivl import shapes
 from ivl.landing import LandingSpec
 from ivl.report import replay
 from ivl.rewards import RewardChoice
@@ -61,7 +62,7 @@ class Album:
         key = _key(spec)
         if key not in self._worlds:
             world = self._worlds[key] = spec.make_world()
-            self._names[key] = self._name_of(f"{spec.vehicle}/{spec.gear_set}/{spec.gear}", replay.geometry(world))
+            self._names[key] = self._name_of(f"{spec.vehicle}/{spec.gear_set}/{spec.gear}", shapes.geometry(world))
         return self._worlds[key]
 
     def _name_of(self, name: str, shapes: dict[str, Any]) -> str:

@@ -55,23 +55,6 @@ def pack(spec: LandingSpec, world: World, trace: Trace, reward: RewardChoice) ->
     }
 
 
-def geometry(world: World) -> dict[str, Any]:
-    """Shapes of the vehicle in body axes, m: what `pack` does not repeat for each landing."""
-    values = world.params.values
-    plates = {
-        name: [*(values[f"{name}.size_{axis}"] for axis in "xyz"), values[f"{name}.center_z"]]
-        for name in ("prop_plate", "base_plate")
-    }
-    return {
-        **plates,
-        "rotor": [values["rotor.x"], values["rotor.y"], values["rotor.z"], values["aero.rotor_radius"]],
-        "hip": [values["leg.hip_xy"], values["leg.hip_z"]],
-        "foot_radius": values["leg.foot_radius"],
-        "leg_length": values["leg.length"],
-        "sensed_gap_offset": values["world.sensed_gap_offset"],
-    }
-
-
 def keep_rows(t_s: FloatArray, values: FloatArray, forced: npt.NDArray[np.bool_]) -> IntArray:
     """Rows that suffice for linear interpolation to be within 1 of all values.
 

@@ -157,7 +157,9 @@ class Room:
 
     def _place(self, rollout: Rollout) -> None:
         """Return when the vehicle stands upright at home, nobody is near, and this policy may be flown."""
-        self._operator.place(self._upcoming(rollout))
+        upcoming = self._upcoming(rollout)
+        self._visit.options.observer.announced(upcoming)
+        self._operator.place(upcoming)
 
     def _upcoming(self, rollout: Rollout) -> Upcoming:
         experiment = self._visit.experiment
