@@ -55,6 +55,7 @@ def test_numbers_are_those_of_the_code() -> None:
         f"full duty is {checks.HOVER_RESERVE:g} of the weight",
         f"expects of {forecast.N} landings",
         f"how many of {forecast.N} land",
+        f"estimate is within {1e3 * tracking.AGREES_M:.0f} mm of",
     ):
         assert text in TEXT, text
     assert room.AWAY_S == 120.0, "two minutes"
