@@ -194,8 +194,8 @@ static void judge_estimate(ivl_cf_t *cf)
 /// Voltage that a parameter says, at this thrust; 0: none does.
 static float told_V(const ivl_cf_t *cf, float thrust_N)
 {
-    const float                 empty_V = 0.01f;
-    const ivl_cf_simulation_t  *set = &cf->set.sim;
+    const float                empty_V = 0.01f;
+    const ivl_cf_simulation_t *set = &cf->set.sim;
     if (set->vbat_V > 0.0f || !(set->cell_V > 0.0f))
     {
         return set->vbat_V;

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from ivl import experiment, yamlfile
-from ivl.links import forecast
+from ivl.links import forecast, tracking
 from ivl.links.sites import room
 from ivl.links.trouble import STATES
 from ivl.rehearsal.script import FAULTS
@@ -49,12 +49,13 @@ def test_every_field_is_told() -> None:
 
 def test_numbers_are_those_of_the_code() -> None:
     for text in (
-        f"within {room.HOME_M:g} m, before it is armed",
+        f"within {tracking.HOME_M:g} m, before it is armed",
         f"{checks.FENCE_MARGIN_M:g} m inside the fence",
         f"along the approach {checks.FLIP_S:g} s of its speed more",
         f"full duty is {checks.HOVER_RESERVE:g} of the weight",
         f"expects of {forecast.N} landings",
         f"how many of {forecast.N} land",
+        f"estimate is within {1e3 * tracking.AGREES_M:.0f} mm of",
     ):
         assert text in TEXT, text
     assert room.AWAY_S == 120.0, "two minutes"

@@ -9,11 +9,13 @@ from ivl import experiment, native
 from ivl.cli import run
 from ivl.errors import RolloutError
 from ivl.experiment import Experiment
-from ivl.links import preflight
+from ivl.links import preflight, tracking
 from ivl.links.tables import Session
 from ivl.links.vehicle import Vehicle
+from ivl.mocap import config as mocap_config
 from ivl.native import Field, NativeLibrary
 from ivl.silproc import SilProcess
+from ivl.site import file as site_file
 from ivl.world import World
 
 
@@ -136,3 +138,18 @@ def test_motors_that_the_image_is_too_weak_for_are_refused_with_what_to_do(serve
     stronger = World("habas2021", **{"rotor.thrust_max": 0.2})
     with Session(server.uri) as session, pytest.raises(RolloutError, match=r"motor_thrust_max.*make -C firmware"):
         Vehicle(session).configure(stronger)
+
+
+def test_the_cameras_of_a_site_see_the_vehicle_at_home(server: SilProcess, in_room: Experiment) -> None:
+    """Limits are wide: on a busy machine cameras in real time are late."""
+    limits = {"lost_s": 0.7, "frozen_s": 0.7, "settle_s": 0.75, "rate_hz_min": 1.0, "jitter_ms_max": 1000.0}
+    cameras = mocap_config.load("simulator").model_copy(update=limits)
+    assert in_room.site is not None
+    room = site_file.load(in_room.site)
+    with Session(server.uri) as session:
+        vehicle = Vehicle(session)
+        assert list(tracking.site_checks(vehicle, room)) == [], "somebody else tells the vehicle its poses"
+        for home_m, ok in (((0.0, 0.0), True), ((0.5, 0.0), False)):
+            place = room.model_copy(update={"mocap": cameras, "home_m": home_m})
+            found = {check.name: check.ok for check in tracking.site_checks(vehicle, place)}
+            assert found == {"motion capture": True, "estimate": True, "home": ok}

@@ -1,19 +1,21 @@
 """The stop: within 50 ms of the key on a link that loses packets, from key and second terminal, as the site says."""
 
+import errno
 import io
 import os
 import pty
 import random
+import struct
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from test_room import GOOD, Script, plan_of, vehicle_of
 
-from ivl import cli
+from ivl import cli, gamepad
 from ivl.errors import LinkError, StoreError
 from ivl.experiment import Experiment
 from ivl.links import preflight, stop
@@ -98,6 +100,57 @@ def test_a_key_at_the_terminal_stops_and_the_terminal_is_given_back(monkeypatch:
         watch.end()
         assert termios.tcgetattr(slave) == before
     os.close(master)
+
+
+def event(value: int, kind: int, number: int = 0) -> bytes:
+    """As the kernel tells it."""
+    return struct.pack("<IhBB", 1234, value, kind, number)
+
+
+@pytest.fixture
+def pad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A device that behaves as the kernel's does; what is written here is read there."""
+    path = tmp_path / "js0"
+    os.mkfifo(path)
+    written = os.open(path, os.O_RDWR)
+    monkeypatch.setattr(gamepad, "FOLDER", tmp_path)
+    yield written
+    os.close(written)
+
+
+def test_a_button_of_a_gamepad_stops_and_nothing_else_that_it_tells(pad: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(""))
+    said: list[str] = []
+    radio = Radio(0.0, random.Random(0))
+    watch = Stop(None, False, said.append)
+    for no_press in (event(1, 0x81), event(-32767, 0x02), event(0, 0x01), event(1, 0x82)):
+        os.write(pad, no_press)
+    watch.begin(radio)
+    time.sleep(0.05)
+    assert not radio.reason
+    os.write(pad, event(32767, 0x02) + event(1, 0x01, 7))
+    until(lambda: bool(said))
+    watch.end()
+    assert radio.reason == "stopped by a gamepad"
+    assert said == ["STOP: by a gamepad: level-out and landing"]
+
+
+def test_a_gamepad_that_is_gone_is_told_and_keys_still_stop(pad: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    with gamepad.buttons(said.append) as pressed:
+        os.write(pad, event(1, 0x01))
+        assert pressed()
+        assert not pressed()
+
+        def fail(*_: object) -> bytes:
+            raise OSError(errno.ENODEV, "No such device")
+
+        monkeypatch.setattr(gamepad.os, "read", fail)
+        assert not pressed()
+        assert not pressed()
+    assert [line.partition(" is gone")[2] for line in said] == [
+        ": it does not stop the vehicle any more (No such device)"
+    ]
 
 
 def test_a_stop_over_a_link_that_is_gone_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

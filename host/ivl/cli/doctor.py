@@ -13,7 +13,7 @@ from ivl.site import file as site_file
 HELP = """Check a vehicle before it flies: what was found, what is needed, what to do.
 
 The vehicle stays on the ground. With EXPERIMENT, its policy bounds and the configuration in force are checked too; with
---site the room, as far as its file goes.
+--site the room: its file, and of a drone whether the tracking system sees it at home.
 
 \b
 Examples:
@@ -39,7 +39,7 @@ def doctor(
 ) -> int:
     """Check a vehicle; HELP is the text that people see."""
     try:
-        from ivl.links import connection, preflight, tables
+        from ivl.links import connection, preflight, sil, tables, tracking
         from ivl.links.vehicle import Vehicle
     except ImportError as error:
         raise LinkError(f"{uri}: a link needs cflib: pip install 'ivl[link]' ({error})") from error
@@ -54,7 +54,10 @@ def doctor(
         if send and chosen is not None:
             vehicle.configure(chosen.make_world())
         least_V = room.battery.rest_V_min if room else preflight.BATTERY_V_MIN
-        found = [*(checks.checks(room, chosen) if room else ()), *preflight.checks(vehicle, chosen, least_V)]
+        found = [*(checks.checks(room, chosen) if room else ())]
+        if room is not None and not sil.is_sil(session):
+            found += tracking.site_checks(vehicle, room)
+        found += preflight.checks(vehicle, chosen, least_V)
     fit = all(check.ok for check in found)
     if as_json:
         console.print_json({"uri": uri, "fit": fit, "checks": [check.as_dict() for check in found]})

@@ -1,4 +1,4 @@
-"""Stop: any key in the terminal, or `ivl stop` in another one, while a vehicle flies.
+"""Stop: any key in the terminal, a button of a gamepad, or `ivl stop` in another terminal, while a vehicle flies.
 
 A thread of its own looks every 5 ms, and sends what stops the vehicle every 5 ms until the flight is over or a tenth of
 a second has passed. Then the thread that flies goes on with it, as with any command. The site says what a stop does:
@@ -17,9 +17,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
+from ivl import gamepad
 from ivl.errors import LinkError, StoreError
 
 FILE, FLYING = "stop", "flying"
@@ -78,9 +80,10 @@ class Stop:
                 (self._folder / name).unlink(missing_ok=True)
 
     def _run(self, vehicle: Stoppable) -> None:
-        with keys() as pressed:
+        with keys() as key, gamepad.buttons(self._say) as button:
+            asked: dict[str, Pressed] = {"a key": key, "a gamepad": button, "ivl stop": partial(is_asked, self._folder)}
             while not self._ended.wait(POLL_S):
-                who = "a key" if pressed() else "ivl stop" if is_asked(self._folder) else ""
+                who = next((name for name, is_so in asked.items() if is_so()), "")
                 if who:
                     self._obey(vehicle, who)
                     return

@@ -1,9 +1,12 @@
 """Motion capture of one connection: poses to the vehicle, an abort when they stop in time, the resting pose."""
 
+import math
+from collections.abc import Iterator
 from contextlib import ExitStack
 from typing import Any, Protocol
 
 from ivl.check import Check
+from ivl.errors import LinkError
 from ivl.links.tables import Session
 from ivl.links.truth import Resting
 from ivl.links.vehicle import Vehicle
@@ -12,6 +15,13 @@ from ivl.mocap.frame import FlightFrame
 from ivl.mocap.guard import LossGuard
 from ivl.mocap.simulated import SimulatedRoom
 from ivl.mocap.stream import Mocap
+from ivl.site.file import SiteFile
+
+HOME_M = 0.3
+"""A vehicle stands at home when it is as near as this, along the floor and in height."""
+AGREES_M = 0.05
+"""The vehicle's estimate and the cameras agree when they are as near as this."""
+_SETTLE_S = 1.0
 
 
 class Tracked(Protocol):
@@ -80,3 +90,47 @@ class Tracking:
     def close(self) -> None:
         """End it; again does nothing."""
         self._stack.close()
+
+
+def site_checks(vehicle: Vehicle, site: SiteFile) -> Iterator[Check]:
+    """Whether the site's tracking system sees the vehicle, where its estimate has it, and at home.
+
+    None where the site says that somebody else tells the vehicle its poses.
+    """
+    if site.mocap is None:
+        return
+    frame = FlightFrame(site.surface.landing_point_m, site.heading_rad)
+    try:
+        tracking = Tracking(vehicle.session, site.mocap, frame)
+    except LinkError as error:
+        yield check_of(str(error))
+        return
+    try:
+        vehicle.wait_in_wall_time(lambda: False, _SETTLE_S)  # its estimate follows the poses
+        yield from _seen(vehicle, site, tracking)
+    finally:
+        tracking.close()
+
+
+def _seen(vehicle: Vehicle, site: SiteFile, tracking: Tracking) -> Iterator[Check]:
+    rates = tracking.mocap.state().rates
+    problems = tracking.problems()
+    yield Check(
+        "motion capture", not problems, "; ".join(problems) or f"good, {rates.rate_hz:.0f} Hz",
+        "good, fast and steady enough", "see ivl mocap",
+    )  # fmt: skip
+    resting = tracking.resting()
+    if resting is None:
+        return
+    away_m = math.dist(resting.p_W_m, vehicle.position_W_m)
+    yield Check(
+        "estimate", away_m <= AGREES_M, f"{1e3 * away_m:.0f} mm from where the cameras see it",
+        f"{1e3 * AGREES_M:.0f} mm or less", "look at body, axes and landing point; stabilizer.estimator 2",
+    )  # fmt: skip
+    x, y, z = resting.p_W_m
+    home_m = math.dist((x, y), site.home_m)
+    yield Check(
+        "home", home_m <= HOME_M and abs(z) <= HOME_M, f"seen at ({x:.2f}, {y:.2f}, {z:.2f}) m",
+        f"within {HOME_M:g} m of ({site.home_m[0]:.2f}, {site.home_m[1]:.2f}, 0)",
+        "put the vehicle there, or correct home_m, landing_point_m or heading_deg",
+    )  # fmt: skip

@@ -6,6 +6,7 @@ for check in checks(site, experiment): ...
 import math
 from collections.abc import Iterator
 
+from ivl import gamepad
 from ivl.check import Check
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
@@ -59,7 +60,9 @@ def tracking(site: SiteFile) -> Check:
 def stop(site: SiteFile) -> Check:
     """Said here, so that everybody knows before the first flight."""
     does = "abort, level-out, landing" if site.stop == "level_out" else "motors off: it falls, and is locked"
-    return Check("stop", True, f"any key in flight, or ivl stop: {does}", "known to everybody in the room", "")
+    pads = len(gamepad.found())
+    who = f"any key in flight, ivl stop, or a button of a gamepad ({pads} found)"
+    return Check("stop", True, f"{who}: {does}", "known to everybody in the room", "")
 
 
 def ceiling(site: SiteFile) -> Check:

@@ -25,7 +25,7 @@ from ivl.links.recovery import AskOperator, Recovery
 from ivl.links.sites.base import Visit, give_back_time
 from ivl.links.stop import Stop
 from ivl.links.tables import Session
-from ivl.links.tracking import Tracked
+from ivl.links.tracking import HOME_M, Tracked
 from ivl.links.trouble import Cause, Trouble, of_checks
 from ivl.links.truth import Resting, note_no_go, outcome_of_flight, suggest_legs
 from ivl.links.vehicle import Command, Supervisor, Vehicle
@@ -37,8 +37,6 @@ from ivl.surface import Surface
 CLIMB_MPS, TRAVEL_MPS = 0.5, 0.5
 NEAR_M = 0.1
 """The vehicle is where it was sent when its estimate is as near as this."""
-HOME_M = 0.3
-"""It stands at home when its estimate is as near as this, along the floor and in height."""
 AWAY_S = 120.0
 """An operator who has not answered for so long was away: the vehicle is checked again before it is armed."""
 SURE_LEGS = (0, 4)
