@@ -24,7 +24,6 @@ TOPICS = {
 }
 
 
-
 def messages(flight: Flight) -> Iterator[tuple[int, str, scene.Message]]:
     """(time in ns, topic, message) in the order of time."""
     times_ns = [round(1e9 * (t - min(flight.t_s[0], 0.0))) for t in flight.t_s]  # MCAP has no time before 0

@@ -119,4 +119,3 @@ def moment(row: Flight) -> dict[str, Any]:
         "battery_V": float(row.columns["battery_V"][0]) if "battery_V" in row.columns else None,
         "cues": {name: float(row.columns[name][0]) for name in ("d_sensed_m", "rrev_per_s", "of_y_radps")},
     }
-
