@@ -51,34 +51,31 @@ def make(part: str, values: dict[str, float], path: Path, extra: dict[str, str])
     words = [word for name, value in numbers.items() for word in ("-D", f"{name}={value}")]
     scad = MODELS / f"{part}.scad"
     with files.replacing(path) as written:
-        target = written.with_name(f"{written.name}.stl")  # OpenSCAD goes by the ending
         try:
             done = subprocess.run(
-                ["openscad", "--hardwarnings", "-o", str(target), *words, str(scad)],
+                ["openscad", "--hardwarnings", "-o", str(written), *words, str(scad)],
                 capture_output=True, text=True, check=False, timeout=600.0,
             )  # fmt: skip
         except FileNotFoundError as error:
             raise ConfigError("openscad is missing: `make cad` installs it") from error
         if done.returncode != 0:
             raise ConfigError(f"{scad.name} with {' '.join(words)}: {done.stderr.strip()}")
-        target.replace(written)
 
 
 def main(arguments: list[str]) -> int:
     """Make what the arguments say; prints each file."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--vehicle", default=model.DEFAULT_VEHICLE)
     parser.add_argument("--gear-set", default="table1", help="name or YAML file")
     parser.add_argument("--gear", help="one design; default: all of the set")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="variable of a model")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "cad", help="folder")
     chosen = parser.parse_args(arguments)
     extra = dict(text.split("=", 1) for text in chosen.set)
-    gears = [chosen.gear] if chosen.gear else model.gear_names(chosen.gear_set)
+    gears = [chosen.gear] if chosen.gear else model.list_gears(chosen.gear_set)
     folder = chosen.out / Path(chosen.gear_set).stem
     folder.mkdir(parents=True, exist_ok=True)
     for gear in gears:
-        values = model.load(chosen.vehicle, gear, chosen.gear_set).values
+        values = {name: found.value for name, found in model.load_gear(gear, chosen.gear_set).quantities.items()}
         for part in PARTS:
             path = folder / f"{gear}_{part}.stl"
             known = (MODELS / f"{part}.scad").read_text(encoding="utf-8")
