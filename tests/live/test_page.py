@@ -63,7 +63,9 @@ def test_a_rehearsed_day_is_shown_as_the_vehicle_tells_it(
     monkeypatch.setattr(preflight, "P95_S_MAX", 10.0)  # a busy machine answers late; that is no fault of the room
     operator = Waits()
     with view_of(in_room, False) as view:
-        options = Options(operator=operator, rehearse=True, say=view.board.hear, observer=view.board)
+        options = Options(
+            operator=operator, rehearse=True, say=lambda line: view.board.hear(f"{line}\n"), observer=view.board
+        )
         flown = Beside(lambda: run.run(in_room, tmp_path / "run", uri="rehearsal://", flight=options))
         look = Look(browser, view.url)
         look.until("live.parts.now.vehicle && live.parts.upcoming && live.parts.learning")
@@ -86,7 +88,7 @@ def test_a_rehearsed_day_is_shown_as_the_vehicle_tells_it(
         assert curves["simulated"]["t_s"]
         assert not look.page.locator("#has-recorded").is_hidden()
         flown.result()
-        assert "flown: " in look.text("log")
+        look.until("live.parts.log && live.parts.log.some((line) => line.startsWith('flown: '))")
     assert [text for text in look.complaints if "WebSocket" not in text] == []
     look.page.close()
 

@@ -156,7 +156,8 @@ class News(_Guarded, websocket.WebSocketHandler):
                     if has.get(name) != part.version:
                         await self._send(part.text)
                         has[name] = part.version
-                await asyncio.sleep(PERIOD_S)
+                async with self.server.pump.ticked:
+                    await self.server.pump.ticked.wait()
         except (websocket.WebSocketClosedError, StreamClosedError):
             pass  # it has gone
         except TimeoutError:
