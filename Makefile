@@ -27,6 +27,8 @@ NATIVE  = $(SUBMAKE) -f tools/native.mk
 CROSS   = $(SUBMAKE) -f tools/stm32.mk
 APP     = $(SUBMAKE) -f tools/app.mk
 say     = @printf '==> %s\n'
+# what is no test of pytest or Unity, both of which end a test that does not, ends after this
+within  = timeout --verbose --kill-after=10 3600
 pip     = $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint tools/constraints.txt
 
 .DEFAULT_GOAL := help
@@ -116,7 +118,7 @@ sizes: setup-dev build firmware ## flash, memory, stack, instructions and cycles
 .PHONY: sizes-diff
 sizes-diff: setup-dev build firmware ## the same against the accepted figures; fails on growth beyond a margin
 	$(say) 'sizes-diff: figures, budgets and tools/stm32/baseline.json'
-	@$(BIN)/python tools/stm32/budget.py --diff $(STM32:%=build/%)
+	@$(within) $(BIN)/python tools/stm32/budget.py --diff $(STM32:%=build/%)
 
 .PHONY: sizes-update
 sizes-update: setup-dev build firmware ## accept the present figures (in a commit that says why)
@@ -155,7 +157,7 @@ san: toolchain setup-dev $(UNITY)/unity.c ## the same C tests, and landings, und
 .PHONY: golden
 golden: setup $(GOLDEN:%=golden-build-%) ## same bits from gcc and clang, -O0 and -O3, any registers, one thread or many
 	$(say) 'golden: hashes of reference landings'
-	@$(BIN)/python tools/golden.py $(GOLDEN:%=build/%/libivl_sil.so)
+	@$(within) $(BIN)/python tools/golden.py $(GOLDEN:%=build/%/libivl_sil.so)
 
 .PHONY: golden-update
 golden-update: setup $(GOLDEN:%=golden-build-%) ## accept the present hashes as the reference (in its own commit, with the reason)
@@ -205,7 +207,7 @@ mutants: setup-dev build toolchain $(UNITY)/unity.c ## small faults put into the
 .PHONY: test-mutants
 test-mutants: setup-dev build toolchain $(UNITY)/unity.c ## a few of these faults, each of which must be found
 	$(say) 'test-mutants: a few small faults'
-	@$(BIN)/python tools/mutants.py --only wire --only mocap --scale 0.07
+	@$(within) $(BIN)/python tools/mutants.py --only wire --only mocap --scale 0.07
 
 .PHONY: sequences
 sequences: toolchain $(UNITY)/unity.c ## random sequences of host, link and vehicle for the app (SEQUENCES=100000 SEED=1)

@@ -25,6 +25,8 @@ HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=add
 HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) $(FORMS_SOURCES) tests/app/sdk_double.c tests/c/default_fixture.c)
 SEQUENCES  ?= 3000
 SEED       ?= 1
+# a hundred thousand take an hour on a busy machine
+TIMEOUT_S  ?= 14400
 
 # ---- Cortex-M4F: the SDK's flags, and the one of our Kbuild files
 
@@ -44,8 +46,8 @@ check: $(HOST)/test_app
 
 # a fuzzer that finds nothing must be able to find something: with --traitor it must
 sequences: $(HOST)/sequences
-	@$< $(SEQUENCES) $(SEED)
-	@if $< $(SEQUENCES) $(SEED) --traitor > $(HOST)/traitor.txt; then echo 'error: sequences did not find the traitor' >&2; exit 1; fi
+	@timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED)
+	@if timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED) --traitor > $(HOST)/traitor.txt; then echo 'error: sequences did not find the traitor' >&2; exit 1; fi
 	@grep -q 'a policy changed in flight' $(HOST)/traitor.txt || { cat $(HOST)/traitor.txt; exit 1; }
 
 $(HOST)/test_app: $(HOST)/tests/app/test_app.o $(HOST_OBJ) $(HOST)/unity.o

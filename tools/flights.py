@@ -1,6 +1,7 @@
 """docs/FLIGHTS.md from recorded flights: measure them, keep the figures, write the page.
 
     .venv/bin/python tools/flights.py measure --logs learning_trial_00.csv calibration.csv --spin-down decay_*.csv
+    .venv/bin/python tools/flights.py believe --logs learning_trial_00.csv calibration.csv
     .venv/bin/python tools/flights.py page [--check]
 
 The logs are those of the paper's authors (public repository bhabas/sar_simulation, MIT licence) and stay where they
@@ -16,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import flights_belief
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -26,6 +28,7 @@ from ivl.flight.log import Given
 ROOT = Path(__file__).parents[1]
 DATA, PAGE = ROOT / "docs/data/flights.json", ROOT / "docs/FLIGHTS.md"
 PICTURE = ROOT / "docs/figures/flights.png"
+BELIEF_PICTURE = ROOT / "docs/figures/flights_belief.png"
 VEHICLE, GEAR, GEAR_SET = "crazyflie21", "wide_short", "table1"
 POLICIES = ((3.72, 6.04), (3.95, 6.0), (4.0, 8.12))
 FITTED = ("rotor.tau_down", "sense.latency", "world.sensed_gap_offset")
@@ -222,6 +225,20 @@ def draw(result: compare.Comparison) -> None:
     picture.draw(result, worlds, [PICTURE], f"{VEHICLE}, {GEAR_SET}/{GEAR}")
 
 
+def believe(logs: list[Path]) -> dict[str, Any]:
+    """What the default learner would have believed after each flight, from the vehicle file as it was."""
+    told = flights_belief.told(importer.run(logs, "habas2021", Given(licence="MIT")))
+    simulated = flights_belief.simulator(VEHICLE, BEFORE, PRIOR_SIGMAS)
+    results = {}
+    for name, options in flights_belief.GUARDS.items():
+        print(f"guards: {name}", file=sys.stderr, flush=True)
+        results[name] = flights_belief.learn(simulated, told, **options)
+    whole, *_ = results.values()
+    flights_belief.draw(whole, BELIEF_PICTURE)
+    guards = {name: flights_belief.summary(result) for name, result in results.items()}
+    return {**flights_belief.summary(whole), "n_flights": len(told), "guards": guards, **whole}
+
+
 def main() -> int:
     """Measure, or write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -229,12 +246,16 @@ def main() -> int:
     first = commands.add_parser("measure", help="recompute docs/data/flights.json and the picture")
     first.add_argument("--logs", nargs="+", type=Path, required=True)
     first.add_argument("--spin-down", nargs="+", type=Path, required=True)
+    third = commands.add_parser("believe", help="recompute what a belief learns from the flights (minutes)")
+    third.add_argument("--logs", nargs="+", type=Path, required=True)
     second = commands.add_parser("page", help="write docs/FLIGHTS.md from docs/data/flights.json")
     second.add_argument("--check", action="store_true", help="only say whether it is up to date")
     args = parser.parse_args()
     if args.command == "measure":
-        DATA.write_text(json.dumps(measure(args.logs, args.spin_down), indent=1) + "\n", encoding="utf-8")
+        _keep(measure(args.logs, args.spin_down) | {"belief": _kept()["belief"]})
         print(f"{DATA.relative_to(ROOT)} and {PICTURE.relative_to(ROOT)} are written")
+    if args.command == "believe":
+        _keep(_kept() | {"belief": believe(args.logs)})
     from flights_page import page
 
     text = page(json.loads(DATA.read_text(encoding="utf-8")))
@@ -242,6 +263,15 @@ def main() -> int:
         return 0 if PAGE.read_text(encoding="utf-8") == text else 1
     PAGE.write_text(text, encoding="utf-8")
     return 0
+
+
+def _kept() -> dict[str, Any]:
+    data: dict[str, Any] = json.loads(DATA.read_text(encoding="utf-8"))
+    return data
+
+
+def _keep(data: dict[str, Any]) -> None:
+    DATA.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -4,11 +4,17 @@ Run by `make mutants`; writes its table of docs/RELIABILITY.md. `--scale 0.02` t
 nothing. Each fault is put into a copy of the tree and built by the project's own makefiles, so that what is tested is
 what is built. A fault that does not compile, or that gives the same program, is none. Those that were looked at and
 change nothing that anybody could see stand in tools/mutants_equal.txt, each with its reason.
+
+Verdicts are kept in build/mutants-kept.jsonl, so that a run that was ended goes on where it was. A kept verdict counts
+as long as neither the source nor the test that found the fault has changed; what was not found is always tried again.
 """
 
 import argparse
+import hashlib
+import json
+import math
 import os
-import random
+import resource
 import shutil
 import signal
 import subprocess
@@ -35,10 +41,11 @@ PAGE = ROOT / "docs" / "RELIABILITY.md"
 EQUAL = ROOT / "tools" / "mutants_equal.txt"
 BEGIN, END = "<!-- measured by tools/mutants.py: begin -->", "<!-- measured by tools/mutants.py: end -->"
 TREE = ROOT / "build" / "mutants"
+KEPT = ROOT / "build" / "mutants-kept.jsonl"
 FLAVOUR = "O0"
 """Compiled and linked soonest."""
-TIME_S = 180.0
-"""A test that takes longer has noticed: its program no longer ends."""
+TIME_S = 300.0
+"""A test that takes longer has noticed: its program waits for what never comes."""
 FOUND, SURVIVED, EQUIVALENT, NONE = "found", "survived", "equivalent", "none"
 QUIET = ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
 """What is loaded before is not rewritten, and need not be."""
@@ -107,10 +114,49 @@ def sources(area: Area) -> list[str]:
 
 
 def candidates(area: Area, seed: int) -> list[Mutant]:
-    """All faults of an area in an order that the seed decides."""
+    """All faults of an area in an order that the seed decides; a change of one line moves no other line's faults."""
     found = [m for path in sources(area) for m in mutants(path, (ROOT / path).read_text(encoding="utf-8"))]
-    random.Random(f"{seed} {area.name}").shuffle(found)
-    return found
+    return sorted(found, key=lambda m: digest(f"{seed} {m.path} {m.before} {m.after}"))
+
+
+def digest(text: str) -> str:
+    """Of a text, for names and orders."""
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def source_of(test: str) -> Path:
+    """The file of a test, by its name in a verdict."""
+    return next(path for path in ROOT.glob(f"tests/*/{test}.*") if path.suffix in (".c", ".py"))
+
+
+def fingerprint(verdict: Verdict) -> str:
+    """What a kept verdict rests on: the source with the fault, and the test that found it."""
+    test = source_of(verdict.by).read_text(encoding="utf-8") if verdict.by else ""
+    return digest(verdict.mutant.path + verdict.mutant.text + test)
+
+
+def keep(verdict: Verdict) -> None:
+    """Write down what became of a fault."""
+    mutant = verdict.mutant
+    names = {"fault": digest(mutant.path + mutant.text), "ending": verdict.ending, "by": verdict.by}
+    with KEPT.open("a", encoding="utf-8") as file:
+        file.write(json.dumps({**names, "fingerprint": fingerprint(verdict), "what": str(mutant)}) + "\n")
+
+
+def read_kept() -> dict[str, dict[str, str]]:
+    """Verdicts of earlier runs by fault, the last of each."""
+    if not KEPT.exists():
+        return {}
+    return {kept["fault"]: kept for kept in map(json.loads, KEPT.read_text(encoding="utf-8").splitlines())}
+
+
+def recalled(mutant: Mutant, kept: dict[str, dict[str, str]]) -> Verdict | None:
+    """The verdict of an earlier run, if it still counts."""
+    earlier = kept.get(digest(mutant.path + mutant.text))
+    if earlier is None or earlier["ending"] == SURVIVED:
+        return None
+    verdict = Verdict(mutant, earlier["ending"], earlier["by"])
+    return verdict if fingerprint(verdict) == earlier["fingerprint"] else None
 
 
 def read_equal() -> dict[tuple[str, str, str], str]:
@@ -131,11 +177,11 @@ def read_equal() -> dict[tuple[str, str, str], str]:
 # ---- running
 
 
-def run(command: list[str], folder: Path) -> int:
-    """Exit code of a command; -1 if it does not end, and then it and its children are ended."""
+def run(command: list[str], processor_s: int = int(TIME_S)) -> int:
+    """Exit code of a command in the copy; -1 if it does not end, and then it and its children are ended."""
     with subprocess.Popen(
-        command,
-        cwd=folder,
+        ["prlimit", f"--cpu={processor_s}", *command],
+        cwd=TREE,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -148,8 +194,8 @@ def run(command: list[str], folder: Path) -> int:
             return -1
 
 
-def run_pytest(test: str) -> int:
-    """Exit code of pytest on a file of the copy, -1 if it does not end.
+def run_pytest(test: str, processor_s: int = int(TIME_S)) -> int:
+    """Exit code of pytest on a file of the copy, negative if it does not end.
 
     A child of this process has what takes long to load already, but nothing of the package that has the fault.
     """
@@ -158,6 +204,7 @@ def run_pytest(test: str) -> int:
         code = 99
         try:
             os.setsid()
+            resource.setrlimit(resource.RLIMIT_CPU, (processor_s, processor_s))
             quiet = os.open(os.devnull, os.O_RDWR)
             for fd in (0, 1, 2):
                 os.dup2(quiet, fd)
@@ -216,16 +263,21 @@ def programs(area: Area, path: str) -> list[str]:
 
 
 def build_of(program: str) -> list[str]:
+    """The command that builds one test program."""
+    return [*APP, f"build/app/{program}"] if program == "test_app" else [*NATIVE, f"build/{FLAVOUR}/{program}"]
+
+
+def check_of(program: str) -> list[str]:
     """The command that builds and runs one test program."""
     return [*APP, "check"] if program == "test_app" else [*NATIVE, f"run-{program}"]
 
 
-def try_c(area: Area, mutant: Mutant) -> Verdict:
+def try_c(area: Area, mutant: Mutant, limits: dict[str, int]) -> Verdict:
     """Compile a fault, and run tests until one fails."""
     if not is_other_code(mutant):
         return Verdict(mutant, NONE)
     for program in programs(area, mutant.path):
-        if run(build_of(program), TREE) != 0:
+        if run(check_of(program), limits[program]) != 0:
             return Verdict(mutant, FOUND, program)
     return Verdict(mutant, SURVIVED)
 
@@ -266,25 +318,27 @@ def assembly(path: Path, place: str) -> bytes | None:
     return done.stdout if done.returncode == 0 else None
 
 
-def try_python(area: Area, mutant: Mutant, source: str) -> Verdict:
+def try_python(area: Area, mutant: Mutant, source: str, limits: dict[str, int]) -> Verdict:
     """Run tests on a fault until one fails, those that name the module first."""
     if not is_other_program(source, mutant.text):
         return Verdict(mutant, NONE)
     stem = Path(mutant.path).stem
     tests = sorted(area.tests, key=lambda name: (stem.split("_")[0] not in name, area.tests.index(name)))
     for test in tests:
-        if run_pytest(test) != 0:
+        if run_pytest(test, limits[test]) != 0:
             return Verdict(mutant, FOUND, Path(test).stem)
     return Verdict(mutant, SURVIVED)
 
 
-def try_one(area: Area, mutant: Mutant) -> Verdict:
+def try_one(area: Area, mutant: Mutant, limits: dict[str, int]) -> Verdict:
     """Put a fault into the copy, ask, and take it out again."""
     path, original = TREE / mutant.path, ROOT / mutant.path
     source = original.read_text(encoding="utf-8")
     path.write_text(mutant.text, encoding="utf-8")
     try:
-        return try_python(area, mutant, source) if path.suffix == ".py" else try_c(area, mutant)
+        if path.suffix == ".py":
+            return try_python(area, mutant, source, limits)
+        return try_c(area, mutant, limits)
     finally:
         shutil.copy(original, path)
         # newer than the object that has the fault
@@ -293,12 +347,17 @@ def try_one(area: Area, mutant: Mutant) -> Verdict:
 
 def try_area(area: Area, number: int, seed: int, equal: dict[tuple[str, str, str], str]) -> list[Verdict]:
     """Verdicts of so many faults that are some."""
+    limits = check_untouched(area)
     verdicts: list[Verdict] = []
+    kept = read_kept()
     for mutant in candidates(area, seed):
         if len(verdicts) >= number:
             break
         began_s = time.monotonic()
-        verdict = try_one(area, mutant)
+        verdict = recalled(mutant, kept)
+        if verdict is None:
+            verdict = try_one(area, mutant, limits)
+            keep(verdict)
         if verdict.ending == SURVIVED and (mutant.path, mutant.before, mutant.after) in equal:
             verdict = Verdict(mutant, EQUIVALENT)
         if verdict.ending != NONE:
@@ -309,17 +368,22 @@ def try_area(area: Area, number: int, seed: int, equal: dict[tuple[str, str, str
     return verdicts
 
 
-def check_untouched(areas: list[Area]) -> None:
-    """Without a fault every test must pass, or nothing is said by one that fails."""
-    for area in areas:
-        first = sources(area)[0]
-        if first.endswith(".c"):
-            commands = [build_of(program) for program in programs(area, first)]
-            bad = [command[-1] for command in commands if run(command, TREE) != 0]
-        else:
-            bad = [test for test in area.tests if run_pytest(test) != 0]
-        if bad:
-            raise SystemExit(f"mutants: without a fault these fail already: {', '.join(bad)}")
+def check_untouched(area: Area) -> dict[str, int]:
+    """Refuse tests that fail without a fault, and measure the others: how many seconds of processor each may take."""
+    limits, bad = {}, []
+    is_c = sources(area)[0].endswith(".c")
+    for test in programs(area, sources(area)[0]) if is_c else area.tests:
+        if is_c:
+            run(build_of(test))
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        if (run(check_of(test)) if is_c else run_pytest(test)) != 0:
+            bad.append(test)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        took_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        limits[test] = 10 + math.ceil(4.0 * took_s)
+    if bad:
+        raise SystemExit(f"mutants: without a fault these fail already: {', '.join(bad)}")
+    return limits
 
 
 # ---- telling
@@ -356,7 +420,6 @@ def main() -> int:
     areas = [area for area in AREAS if not arguments.only or area.name in arguments.only]
     equal = read_equal()
     copy_tree()
-    check_untouched(areas)
     results = {}
     for area in areas:
         number = max(round(area.number * arguments.scale), 1)

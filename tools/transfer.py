@@ -3,6 +3,7 @@
     .venv/bin/python tools/transfer.py                         30 drones, 24 flights each, with ephe_belief
     .venv/bin/python tools/transfer.py --learner bo            another learner beside it
     .venv/bin/python tools/transfer.py --scale 3               drones from a family three times as wide
+    .venv/bin/python tools/transfer.py --outside               twelve drones, each wrong in a way that no member is
     .venv/bin/python tools/transfer.py --set vehicle=habas2021 --set gear_set=as_simulated --set start=imparted
 
 It is `ivl learn experiments/transfer.yaml --trials N`, whose folder --out keeps, with two things beside its summary:
@@ -27,6 +28,23 @@ from ivl.learning.loop import Progress
 from ivl.outcome import four_leg
 
 AFTER = (1, 2, 4, 8, 24)
+OUTSIDE: dict[str, dict[str, float]] = {
+    "rotors stop late": {"rotor.tau_down": 1.6},
+    "rotors start late": {"rotor.tau_up": 1.6},
+    "weak rotors": {"rotor.thrust_gain": 0.82},
+    "inflow": {"rotor.inflow_loss": 3.0},
+    "inertia": {"body.inertia_yy": 1.5},
+    "drag": {"aero.drag_xy": 6.0, "aero.drag_z": 6.0},
+    "damped feet": {"leg.foot_damping": 2.0e-3},
+    "friction": {"plate.friction": 0.2},
+    "soft legs": {"leg.stiffness": 0.4},
+    "short legs": {"leg.length": 0.8},
+    "plane of the cues": {"world.sensed_gap_offset": 0.04},
+    "latency": {"sense.latency": 0.025},
+}
+"""Vehicles that no member of the family explains: factors on the values of the files, but for those of `VALUES`."""
+VALUES = ("leg.foot_damping", "world.sensed_gap_offset", "sense.latency")
+"""Given as values: the files have 0, or something near it."""
 _LEAST = 1e-3
 
 
@@ -41,23 +59,50 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--scale", type=float, default=1.0, help="spread of the drones' family, in that of the learner's"
     )
+    parser.add_argument("--outside", action="store_true", help="drones outside the family, instead of --drones")
     parser.add_argument("--seed", type=int, default=1000, help="of the drones")
     parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
-    parser.add_argument("--out", type=Path, help="keep the run folder")
+    parser.add_argument("--out", type=Path, help="keep the run folder, or those of --outside within it")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args(arguments)
-    drawn = ["family.member=each", f"family.member_scale={args.scale}", f"family.seed={args.seed}"]
-    settings = [*drawn, "n_rollouts=1", f"budget={args.flights}", *args.settings]
-    chosen = experiment.load(args.experiment, settings, learner=args.learner)
-    hooks = run.Hooks(on_episode=_episode, on_bank=_bank, on_drone=_drone)
     with tempfile.TemporaryDirectory() as scratch:
-        result = run.run(chosen, args.out or Path(scratch) / "run", args.drones, False, args.workers, hooks)
-    drones = _drones(result, args.workers)
+        drones = (_outside if args.outside else _inside)(args, args.out or Path(scratch) / "run")
+    chosen = _experiment(args, args.seed, {})
     if args.json:
         print(json.dumps({"learner": chosen.learner.name, "drones": drones}))
     else:
         _report(chosen, drones)
     return 0
+
+
+def _experiment(args: argparse.Namespace, seed: int, overrides: dict[str, float]) -> experiment.Experiment:
+    """What the drones of a seed fly; overrides of theirs are unknown to the learner."""
+    drawn = ["family.member=each", f"family.member_scale={args.scale}", f"family.seed={seed}"]
+    other = [f"family.member_overrides={json.dumps(overrides)}"] if overrides else []
+    settings = [*drawn, *other, "n_rollouts=1", f"budget={args.flights}", *args.settings]
+    return experiment.load(args.experiment, settings, learner=args.learner)
+
+
+def _inside(args: argparse.Namespace, folder: Path) -> list[dict[str, Any]]:
+    return _flown(_experiment(args, args.seed, {}), folder, args.drones, args.workers)
+
+
+def _outside(args: argparse.Namespace, folder: Path) -> list[dict[str, Any]]:
+    """One drone for each way to be wrong."""
+    chosen = _experiment(args, args.seed, {})
+    values_of_files = chosen.nominal_world_of(chosen.gear).params.values
+    drones = []
+    for number, (name, wrong) in enumerate(OUTSIDE.items()):
+        _say(f"drone {number + 1} of {len(OUTSIDE)}: {name}")
+        values = {p: x if p in VALUES else x * values_of_files[p] for p, x in wrong.items()}
+        chosen = _experiment(args, args.seed + number, values)
+        drones += [one | {"name": name} for one in _flown(chosen, folder / str(number), 1, args.workers)]
+    return drones
+
+
+def _flown(chosen: experiment.Experiment, folder: Path, n: int, workers: int) -> list[dict[str, Any]]:
+    hooks = run.Hooks(on_episode=_episode, on_bank=_bank, on_drone=_drone)
+    return _drones(run.run(chosen, folder, n, False, workers, hooks), workers)
 
 
 def _drones(result: run.RunResult, threads: int) -> list[dict[str, Any]]:
@@ -118,6 +163,12 @@ def _report(chosen: experiment.Experiment, drones: list[dict[str, Any]]) -> None
     told = [drone["fits"] for drone in drones if drone["fits"] is not None]
     if told:
         print(f"no member fits, said of {told.count(False)} drones")
+    for drone in drones:
+        if "name" in drone:
+            flights = "".join(".X"[landed] for landed in drone["landed"])
+            last = list(drone["shares"].values())[-1]
+            says = "" if drone["fits"] else "; no member fits"
+            print(f"{drone['name']:18} {flights} best {drone['best']:.2f}, {last:.2f} of it at the end{says}")
 
 
 if __name__ == "__main__":

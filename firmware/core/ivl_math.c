@@ -99,12 +99,12 @@ static float power_of_two(int n)
 
 float ivl_logistic(float x)
 {
-    const float s = ivl_clamp(x, -LOGISTIC_MAX, LOGISTIC_MAX);
     // exp of a number that is not positive, so that nothing overflows
-    const float a = -fabsf(s);
+    const float x_abs = fabsf(x), a = (x_abs < LOGISTIC_MAX) ? -x_abs : -LOGISTIC_MAX;
     const int   n = (int)(a * LOG2_E - 0.5f);
     const float k = (float)n;
     const float e = exp_poly((a - k * LN_2_1) - k * LN_2_2) * power_of_two(n);
     const float low = e / (1.0f + e);
-    return (s < 0.0f) ? low : 1.0f - low;
+    // NaN is no reason to go
+    return (x > 0.0f) ? 1.0f - low : low;
 }

@@ -6,7 +6,8 @@ best rate: The largest four-leg rate that any policy reaches in this world. One 
     dense grid, which is sifted in stages (more rollouts for the better points). More of them are searched by CMA-ES,
     first from where the experiment begins, then from random places, which ends where landings are; and then by clouds
     of policies around these ends, sifted like the grid, since in noise a search alone ends beside the best rate.
-    Either way the last stage flies fresh rollouts, so that the figure is not inflated by having been selected.
+    Either way the one that is chosen then flies fresh rollouts, and their rate counts: the rate by which it was chosen
+    is inflated by the choice.
     `Best.search` says which it was. Of policies with equal rates the one with the larger margin rate is the better one.
 margin rate: The landing rate of a policy of the paper's form, averaged over errors of timing and moment
     (`ivl.belief.decide`), by rollouts in this world. Other forms have none.
@@ -38,7 +39,7 @@ from ivl.world import World
 
 _STAGES = ((1.0, 8), (0.1, 64), (0.01, 400))
 """(share of the grid points that fly on, rollouts of each), added to what they flew before."""
-_FINALISTS, _FINAL_ROLLOUTS = 10, 1000
+_FINALISTS, _FINAL_ROLLOUTS, _LAST_ROLLOUTS = 10, 1000, 4000
 _GRID_STEPS = (140, 20)
 """Steps of each axis of the grid between the bounds of the policy, where an experiment gives no grid."""
 _WIDEST, _MARGIN_ROLLOUTS = (8, 3), (50, 100, 300)
@@ -130,13 +131,16 @@ def find_best(
     theta = _grid(_axes(experiment))
     axes = _values(_axes(experiment))
     margins = _Margins(axes, theta) if has_margin(experiment) and all(len(axis) > 1 for axis in axes) else None
-    chosen, four, spotless = _sift(flights, theta, (*_STAGES, (0.0, _FINAL_ROLLOUTS)), on_stage, margins)
-    top = int(np.argmax(four))  # of the fresh rollouts of the last stage alone; of equal ones the first is the widest
-    best = Best(
-        tuple(chosen[top].tolist()), float(four[top]), float(spotless[top]), flights.n_flown,
-        f"grid of {len(theta)} policies",
-    )  # fmt: skip
+    chosen, four, _ = _sift(flights, theta, (*_STAGES, (0.0, _FINAL_ROLLOUTS)), on_stage, margins)
+    top = chosen[int(np.argmax(four))]  # of equal ones the first is the widest
+    best = _judged(flights, top, f"grid of {len(theta)} policies")
     return best if margins is None else _with_margins(flights, best, theta, margins)
+
+
+def _judged(flights: "_Flights", theta: FloatArray, search: str) -> Best:
+    """A policy that was chosen, by fresh rollouts."""
+    four, spotless = flights.rates(theta[None], flights.scaled(_LAST_ROLLOUTS))
+    return Best(tuple(theta.tolist()), float(four[0]), float(spotless[0]), flights.n_flown, search)
 
 
 def has_margin(experiment: Experiment) -> bool:
@@ -304,12 +308,11 @@ def _search_long(flights: _Flights, on_stage: OnStage | None) -> Best:
     # the best of a first look, judged by a second one
     finalists, four, _ = _sift(flights, elite, ((1.0, _FINAL_ROLLOUTS),))
     theta = finalists[int(np.argmax(four))]
-    four, spotless = flights.rates(theta[None], flights.scaled(_FINAL_ROLLOUTS))
     each = flights.scaled(_GENERATIONS) * _POPULATION
     words = (
         f"{_SEARCHES} searches of {each} rollouts at most, the best refined in {_CLOUDS} clouds of {_CLOUD} policies"
     )
-    return Best(tuple(theta.tolist()), float(four[0]), float(spotless[0]), flights.n_flown, words)
+    return _judged(flights, theta, words)
 
 
 def _climb(flights: _Flights, bounds: FloatArray, start: FloatArray, seed: int) -> FloatArray:

@@ -17,7 +17,7 @@ from ivl.belief.recording import Flight
 from ivl.errors import ArgumentError, ConfigError, LearnerError
 from ivl.learners import Learner, make_learner
 from ivl.rewards import RewardChoice
-from ivl.settings import PACKAGE_DIR, Finite, Strict, apply_setting, check_overrides, locate, read_mapping
+from ivl.settings import PACKAGE_DIR, Finite, Name, Strict, apply_setting, check_overrides, locate, read_mapping
 from ivl.site import file as site_file
 from ivl.site import place
 from ivl.task import Task
@@ -150,7 +150,7 @@ def _site(path: str) -> str:
 class Named(Strict):
     """What a file calls itself."""
 
-    name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$")
+    name: Name
     doc: str = Field(min_length=1)
 
 

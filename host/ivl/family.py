@@ -16,7 +16,7 @@ parameter that an override sets is known, and keeps its value. The flight core o
 thrust of its own vehicle, as that of every world does.
 """
 
-from collections.abc import Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, Self
 
@@ -112,6 +112,10 @@ class FamilyChoice(Strict):
         le=10,
         description="factor on `scale` for the members that fly; who learns knows `scale` alone",
     )
+    member_overrides: dict[str, Finite] = Field(
+        default_factory=dict,
+        description="values of the members that fly, whatever is drawn; who learns does not know them",
+    )
 
     @property
     def is_each(self) -> bool:
@@ -144,6 +148,7 @@ class FamilyChoice(Strict):
                 pair = getattr(spread, key)
                 if pair is not None and not field.lo <= pair[0] < pair[1] <= field.hi:
                     raise ConfigError(f"{where}.{key}: value {pair} is out of range ({_allowed(field)})")
+        _check_values(self.member_overrides, "family.member_overrides", table)
         for pattern in self.known:
             if not any(_is_known(name, [pattern]) for name in table):
                 raise ConfigError(f"family.known: {pattern}: unknown parameter{yamlfile.did_you_mean(pattern, table)}")
@@ -224,12 +229,14 @@ class Family:
         dimensions: The parameters that are drawn, in the order of their names.
         root: L of equation (1), lower triangle, shape (n, n).
         scale: Factor on all of x.
+        overrides: Values that every member has, whatever is drawn.
     """
 
     world: World
     dimensions: tuple[Dimension, ...]
     root: FloatArray
     scale: float
+    overrides: Mapping[str, float]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -262,7 +269,8 @@ class Family:
         Raises:
             NativeError: The library refuses it.
         """
-        return self.world.changed(**dict(zip(self.names, self.values(z).tolist(), strict=True)))
+        drawn = dict(zip(self.names, self.values(z).tolist(), strict=True))
+        return self.world.changed(**{**drawn, **self.overrides})
 
     def draw(self, rng: np.random.Generator) -> tuple[FloatArray, World]:
         """One member: z, shape (n,), and its world.
@@ -336,7 +344,7 @@ def of(world: World, choice: FamilyChoice | None = None) -> Family:
         raise ConfigError(f"family: {who}: no parameter has a sigma, so that all members are alike")
     dimensions = tuple(_dimension(world, name, spreads[name]) for name in names)
     overridden = {name for name, origin in params.origin.items() if origin == _OVERRIDE}
-    return Family(world, dimensions, _root(names, choice.correlations, overridden), choice.scale)
+    return Family(world, dimensions, _root(names, choice.correlations, overridden), choice.scale, {})
 
 
 def is_uncertain(world: World, choice: FamilyChoice) -> bool:
@@ -378,7 +386,8 @@ def flown(world: World, choice: FamilyChoice, n: int) -> list[World]:
         ConfigError: As `of` and `Family.sample`.
     """
     kin = of(world, choice)
-    return replace(kin, scale=choice.member_scale * kin.scale).sample(n, choice.seed).worlds
+    wide = replace(kin, scale=choice.member_scale * kin.scale, overrides=choice.member_overrides)
+    return wide.sample(n, choice.seed).worlds
 
 
 def _is_known(name: str, known: Sequence[str]) -> bool:
@@ -390,6 +399,13 @@ def _field(name: str, where: str, table: model.Table) -> native.Field:
     if name not in table:
         raise ConfigError(f"{where}: {name}: unknown parameter{yamlfile.did_you_mean(name, table)}")
     return table[name]
+
+
+def _check_values(values: Mapping[str, float], where: str, table: model.Table) -> None:
+    for name, value in values.items():
+        field = _field(name, where, table)
+        if not field.lo <= value <= field.hi:
+            raise ConfigError(f"{where}.{name}: value {value:g} is out of range ({_allowed(field)})")
 
 
 def _dimension(world: World, name: str, spread: Spread) -> Dimension:

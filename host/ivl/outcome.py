@@ -95,12 +95,20 @@ def verdict(outcome: Any) -> str:
     return f"{int(outcome['n_legs'])} feet stuck{contact or ', clean'}"
 
 
+def end_code(name: str) -> int:
+    """Code of an end by its name.
+
+    Raises:
+        NativeError: The library has none of that name.
+    """
+    library = native.library()
+    for code in range(int(library.outcome_fields["end_reason"].hi) + 1):
+        if library.end_reason(code) == name:
+            return code
+    raise NativeError(f"the library has no end called {name}")
+
+
 @cache
 def _invalid_codes() -> tuple[int, ...]:
     """Codes of `INVALID_ENDS` in the library."""
-    library = native.library()
-    codes = range(int(library.outcome_fields["end_reason"].hi) + 1)
-    found = tuple(code for code in codes if library.end_reason(code) in INVALID_ENDS)
-    if len(found) != len(INVALID_ENDS):
-        raise NativeError(f"the library has no end called {' or '.join(INVALID_ENDS)}")
-    return found
+    return tuple(end_code(name) for name in INVALID_ENDS)

@@ -20,7 +20,21 @@ from typing import Any
 import numpy as np
 
 import ivl
-from ivl import assess, experiment, family, files, forms, links, margin, native, numerics, references, yamlfile
+from ivl import (
+    assess,
+    experiment,
+    family,
+    files,
+    forms,
+    links,
+    margin,
+    native,
+    numerics,
+    references,
+    sessions,
+    yamlfile,
+)
+from ivl import flown as flown_landings
 from ivl.belief.simulator import Simulator
 from ivl.errors import ConfigError, StoreError
 from ivl.experiment import Experiment
@@ -39,7 +53,9 @@ from ivl.world import World
 
 _N_MARGIN = 100
 """Rollouts for each point of a recommendation's margin rate at an effort of 1, of each trial's vehicle."""
-_MUST_MATCH = ("trials", "uri", "config_sha256", "model_sha256", "library_sha256")
+_MUST_MATCH = ("trials", "config_sha256")
+_MUST_MATCH_BITS = ("uri", "model_sha256", "library_sha256")
+"""Further fields of the manifest of a run that can be repeated bit for bit."""
 
 
 @dataclass(frozen=True)
@@ -128,13 +144,17 @@ def run(
     manifest = make_manifest(packed, files_world, n_trials, uri)
     if earlier and resume and (folder / "manifest.json").exists():
         raise ConfigError(f"--from: {folder} is resumed with the flights that it began with: leave it out")
-    told = gather([_read_run(run) for run in earlier], chosen, uri, each) if earlier else _kept_earlier(folder, resume)
+    told = (
+        gather([_read_run(run) for run in earlier], chosen, uri, each)
+        if earlier
+        else (kept_earlier(folder) if resume else None)
+    )
     if told is not None:
         content = told.to_bytes()
         copies = copies | {EARLIER_FILE: content}
         manifest["earlier"] = {"runs": list(told.runs), "sha256": hashlib.sha256(content).hexdigest()}
     with ExitStack() as stack:
-        simulator, notes = _simulator(chosen, threads, hooks)
+        simulator, notes = simulator_of(chosen, threads, hooks.on_bank)
         notes += [] if told is None else told.notes
         if hooks.on_note:
             for note in notes:
@@ -143,7 +163,15 @@ def run(
             uri, chosen, worlds if each else worlds[0], threads, folder, flight, simulator is not None
         )
         stack.callback(source.close)
-        store = stack.enter_context(_open(folder, packed, copies, manifest, resume))
+        if source.is_flown:
+            manifest |= {"flown": True, "rehearsed": bool(flight and flight.rehearse)}
+            manifest["sessions"] = [sessions.session_of(manifest, source.vehicle)]
+        store, changed = _open(folder, packed, copies, manifest, resume)
+        stack.enter_context(store)
+        notes += changed
+        if hooks.on_note:
+            for note in changed:
+                hooks.on_note(note)
         if hooks.on_start:
             hooks.on_start(folder)
         n_thinking = 1 if simulator is None else threads or len(os.sched_getaffinity(0))
@@ -152,6 +180,9 @@ def run(
         source.close()
         flown = _Flown(chosen, worlds, each, store.episodes(), store.rollouts(), threads)
         bests, verdicts, summary = _judge(flown, folder, n_trials, hooks)
+        if source.is_flown:
+            found = flown_landings.landings(folder, chosen, worlds[0], flown.rollouts)
+            summary["flown"] = flown_landings.summary(found, flown.rollouts)
         summary |= {
             "run_dir": str(folder),
             "learner": chosen.learner.name,
@@ -243,7 +274,9 @@ def _open_source(
     return links.open_source(uri, chosen, threads, replace(flight or Options(), folder=folder), record)
 
 
-def _simulator(chosen: Experiment, threads: int | None, hooks: Hooks) -> tuple[Simulator | None, list[str]]:
+def simulator_of(
+    chosen: Experiment, threads: int | None = None, on_bank: Callable[[int, int], None] | None = None
+) -> tuple[Simulator | None, list[str]]:
     """Simulated vehicles for a learner that begins with them, and why there are none."""
     if not LEARNERS[chosen.learner.name].cls.uses_simulator:
         return None, []
@@ -253,12 +286,12 @@ def _simulator(chosen: Experiment, threads: int | None, hooks: Hooks) -> tuple[S
     if not family.is_uncertain(home, chosen.family):
         return None, ["learned from flights alone: no parameter of the vehicle has a sigma"]
     kin = family.of(home, chosen.family)
-    return Simulator.of(kin, chosen.flight, threads=threads, progress=hooks.on_bank), []
+    return Simulator.of(kin, chosen.flight, threads=threads, progress=on_bank), []
 
 
-def _kept_earlier(folder: Path, resume: bool) -> Earlier | None:
-    """The flights of earlier runs with which a run that is resumed began."""
-    kept = read_manifest(folder).get("earlier") if resume and (folder / "manifest.json").exists() else None
+def kept_earlier(folder: Path) -> Earlier | None:
+    """The flights of earlier runs with which a run began; None: with none, or there is no run yet."""
+    kept = read_manifest(folder).get("earlier") if (folder / "manifest.json").exists() else None
     if kept is None:
         return None
     path = folder / EARLIER_FILE
@@ -369,30 +402,41 @@ def make_manifest(
 
 def _open(
     folder: Path, chosen: Experiment, copies: dict[str, bytes], manifest: dict[str, Any], resume: bool
-) -> RunStore:
+) -> tuple[RunStore, list[str]]:
+    """The store of a run, and what is another one than in its last session."""
     dtype = native.library().outcome_dtype
     layout = layout_of(chosen)
     if not resume or not (folder / "manifest.json").exists():
         if resume and not folder.exists():
             raise StoreError(f"{folder}: there is no run to resume")
-        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype, layout, copies)
+        return RunStore.create(folder, chosen.to_yaml(), manifest, dtype, layout, copies), []
     old = read_manifest(folder)
     check_version(folder, old, SCHEMA_VERSION)
-    for key in _MUST_MATCH:
-        if old.get(key) != manifest[key]:
-            raise StoreError(f"{folder}: cannot be resumed: {_difference(folder, key, old, manifest, chosen)}")
-    if old.get("numerics", manifest["numerics"]) != manifest["numerics"]:
-        raise StoreError(
-            f"{folder}: cannot be resumed: it was computed by {old['numerics']}, here is {manifest['numerics']}, so "
-            f"its search would not continue bit for bit ({numerics.ADVICE})"
-        )
+    _refuse_other_run(folder, old, manifest, chosen)
     store = RunStore.open_existing(folder, dtype)
     if store.layout != layout:
         store.close()
         raise StoreError(
             f"{folder}: cannot be resumed: the terms of its reward or the parameters of its policy changed"
         )
-    return store
+    if not old.get("flown"):
+        return store, []
+    continued, changed = sessions.go_on(old, manifest["sessions"][0])
+    write_json(folder / "manifest.json", continued)
+    return store, changed
+
+
+def _refuse_other_run(folder: Path, old: dict[str, Any], manifest: dict[str, Any], chosen: Experiment) -> None:
+    """Refuse to continue a run with another configuration, or with what cannot go on bit for bit if it has to."""
+    sessions.refuse_other_kind(folder, old, manifest)
+    for key in _MUST_MATCH if old.get("flown") else (*_MUST_MATCH, *_MUST_MATCH_BITS):
+        if old.get(key) != manifest[key]:
+            raise StoreError(f"{folder}: cannot be resumed: {_difference(folder, key, old, manifest, chosen)}")
+    if not old.get("flown") and old.get("numerics", manifest["numerics"]) != manifest["numerics"]:
+        raise StoreError(
+            f"{folder}: cannot be resumed: it was computed by {old['numerics']}, here is {manifest['numerics']}, so "
+            f"its search would not continue bit for bit ({numerics.ADVICE})"
+        )
 
 
 def _difference(folder: Path, key: str, old: dict[str, Any], new: dict[str, Any], chosen: Experiment) -> str:

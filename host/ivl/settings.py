@@ -16,6 +16,8 @@ from ivl.errors import ConfigError
 PACKAGE_DIR = Path(__file__).parent
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=64)]
+"""What something calls itself: run folders are named after it, so it is one component of a path, and no hidden one."""
 
 
 class Strict(BaseModel):

@@ -48,6 +48,8 @@ class Flown:
     outcomes: Outcomes
     discarded: str = ""
     recordings: npt.NDArray[np.float64] | None = None
+    theta: npt.NDArray[np.float64] | None = None
+    """Policies that the operator had flown instead of the plan's, shape (m, dim); None: the plan's were."""
 
 
 class RolloutSource(Protocol):
@@ -55,9 +57,13 @@ class RolloutSource(Protocol):
 
     Attributes:
         warnings: What a reader of the results has to know, one line each.
+        is_flown: Whether its outcomes are those of a vehicle in a room, which nobody can repeat bit for bit.
+        vehicle: Which vehicle flies, as it identifies itself; empty: none does, or it does not tell.
     """
 
     warnings: list[str]
+    is_flown: bool
+    vehicle: str
 
     def fly(self, plan: Plan) -> Iterator[Flown]:
         """Fly every row of the plan once.
@@ -74,6 +80,8 @@ class RolloutSource(Protocol):
 
 class WorldSource:
     """The simulator in this process: a whole plan in one native batch."""
+
+    is_flown, vehicle = False, ""
 
     def __init__(self, world: World, experiment: Experiment, threads: int | None = None, record: bool = False) -> None:
         """Fly the experiment's approach in `world`; `record`: give what each flip recorded, too."""
@@ -109,6 +117,8 @@ class WorldSource:
 
 class TrialSource:
     """The simulator in this process, in which every trial has a vehicle of its own."""
+
+    is_flown, vehicle = False, ""
 
     def __init__(
         self, worlds: Sequence[World], experiment: Experiment, threads: int | None = None, record: bool = False

@@ -16,6 +16,7 @@ bit. SQLite stores float64 exactly, but for the sign of a zero; NaN is stored as
 
 import errno
 import fcntl
+import getpass
 import hashlib
 import json
 import math
@@ -23,8 +24,9 @@ import os
 import shutil
 import sqlite3
 import tempfile
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -36,7 +38,7 @@ import ivl
 from ivl import files, references
 from ivl.errors import IvlError, StoreError
 from ivl.layout import Layout
-from ivl.learning.recorder import DISCARDED, PLANNED, SCORED, EpisodeRow, RolloutRows
+from ivl.learning.recorder import DISCARDED, PLANNED, SCORED, Amendment, EpisodeRow, RolloutRows
 from ivl.outcome import Outcomes
 from ivl.quantity import Quantity
 from ivl.rewards.base import TOTAL, Terms
@@ -240,19 +242,107 @@ class RunStore:
                     f"{self.folder}: {len(rows) - changed} of {len(rows)} scored rollouts were not planned"
                 )
 
+    def fly_instead(
+        self,
+        episode: int,
+        trial: npt.NDArray[np.int64],
+        idx: npt.NDArray[np.int64],
+        theta: npt.NDArray[np.float64],
+    ) -> None:
+        """Commit other policies in place of planned ones, and keep what was planned.
+
+        Raises:
+            StoreError: One of them was not planned, or is scored already; then none is committed.
+        """
+        names = self.layout.policy_columns()
+        key = "trial=? AND episode=? AND idx=?"
+        with self._transaction():
+            for of_trial, place, policy in zip(trial.tolist(), idx.tolist(), theta.tolist(), strict=True):
+                at = (of_trial, episode, place)
+                query = f"SELECT {', '.join(names)} FROM rollout WHERE {key} AND status='{PLANNED}'"
+                before = self._db.execute(query, at).fetchone()
+                if before is None:
+                    raise StoreError(f"{self.folder}: a rollout that is flown with another policy was not planned")
+                self._db.execute(f"UPDATE rollout SET {', '.join(f'{n}=?' for n in names)} WHERE {key}", (*policy, *at))
+                said = [dict(zip(names, values, strict=True)) for values in (before, policy)]
+                why = "another policy was flown instead"
+                self._keep(Amendment(of_trial, episode, place, _utc(), getpass.getuser(), why, said[0], said[1]))
+
+    def amend(
+        self,
+        row: RolloutRows,
+        discarded: str,
+        made: Amendment,
+        tell_again: Callable[[], tuple[Sequence[EpisodeRow], Mapping[str, Any]]],
+    ) -> None:
+        """Commit an outcome in place of another one, keep what was there, and commit what is learned then; all or none.
+
+        Args:
+            row: The rollout as it is now.
+            discarded: Why it does not count; empty: it does.
+            made: What is kept of the change.
+            tell_again: Called when the outcome can be read; gives all finished episodes of the trial anew, and its
+                learner's state.
+
+        Raises:
+            StoreError: There is no such rollout.
+        """
+        rewards = self._reward_columns()
+        names = ("status", "discarded", *rewards.values(), *self._outcome_columns)
+        terms = row.terms | {TOTAL: row.reward}
+        values = [str(row.status[0]), discarded, *(_to_sql(float(terms[name][0])) for name in rewards)]
+        values += [_to_sql(column[0]) for column in self._flatten(row.outcomes)]
+        at = (made.trial, made.episode, made.idx)
+        with self._transaction():
+            query = f"UPDATE rollout SET {', '.join(f'{n}=?' for n in names)} WHERE trial=? AND episode=? AND idx=?"
+            if self._db.execute(query, (*values, *at)).rowcount != 1:
+                raise StoreError(f"{self.folder}: there is no rollout {at}")
+            self._keep(made)
+            episodes, state = tell_again()
+            for episode in episodes:
+                self._db.execute("DELETE FROM episode WHERE trial=? AND episode=?", (episode.trial, episode.episode))
+            self._insert_episodes(episodes)
+            self._save_states([made.trial], [state])
+
+    def amendments(self) -> list[Amendment]:
+        """All changes that people made, the earliest first."""
+        with _explained(self.folder):
+            if not self._db.execute("SELECT 1 FROM sqlite_master WHERE name='amendment'").fetchone():
+                return []
+            rows = self._db.execute("SELECT * FROM amendment ORDER BY rowid").fetchall()
+            return [
+                Amendment(trial, episode, idx, utc, who, why, json.loads(before), json.loads(after))
+                for trial, episode, idx, utc, who, why, before, after in rows
+            ]
+
+    def _keep(self, made: Amendment) -> None:
+        """A row of the table of amendments, which only a run has in which somebody changed something."""
+        self._db.execute(
+            f"CREATE TABLE IF NOT EXISTS amendment({_ROLLOUT_KEY}, utc TEXT NOT NULL, who TEXT NOT NULL, "
+            "why TEXT NOT NULL, before TEXT NOT NULL, after TEXT NOT NULL)"
+        )
+        said = (json.dumps(said, allow_nan=False) for said in (made.before, made.after))
+        values = (made.trial, made.episode, made.idx, made.utc, made.who, made.why, *said)
+        self._db.execute("INSERT INTO amendment VALUES(?,?,?,?,?,?,?,?)", values)
+
     def finish_episode(self, rows: Sequence[EpisodeRow], states: Iterable[Mapping[str, Any]]) -> None:
         """Commit one episode of some trials: its figures and the learners' states after `tell`, in one transaction."""
-        values = [
-            (r.trial, r.episode, r.n_scored, *r.mu, *r.sigma, *r.recommended,
-             *map(_to_sql, (r.reward_mean, r.rate_four_leg, r.rate_clean)), int(r.stopped), _insight_text(r))
-            for r in rows
-        ]  # fmt: skip
         with self._transaction():
-            self._db.executemany(
-                f"INSERT INTO episode VALUES({_marks(('trial', 'episode', *self._figures()))})", values
-            )
+            self._insert_episodes(rows)
             self._save_states([r.trial for r in rows], states)
-            self._seal((r.trial, r.episode, self._digest(r.trial, r.episode)) for r in rows)
+
+    def _insert_episodes(self, rows: Sequence[EpisodeRow]) -> None:
+        """Rows of the table of episodes, with their seals."""
+        marks = _marks(("trial", "episode", *self._figures()))
+        self._db.executemany(f"INSERT INTO episode VALUES({marks})", [self._episode_values(row) for row in rows])
+        self._seal((row.trial, row.episode, self._digest(row.trial, row.episode)) for row in rows)
+
+    @staticmethod
+    def _episode_values(row: EpisodeRow) -> tuple[Any, ...]:
+        """A row of the table of episodes."""
+        figures = map(_to_sql, (row.reward_mean, row.rate_four_leg, row.rate_clean))
+        said = (*row.mu, *row.sigma, *row.recommended, *figures, int(row.stopped), _insight_text(row))
+        return (row.trial, row.episode, row.n_scored, *said)
 
     def learner_states(self) -> dict[int, dict[str, Any]]:
         """The last saved state of each trial's learner."""
@@ -512,6 +602,10 @@ def _outcome_columns(dtype: np.dtype[np.void]) -> dict[str, str]:
 def _recording_text(row: npt.NDArray[np.float64]) -> str:
     """A recording as JSON; null where there is nothing."""
     return json.dumps([_to_sql(value) for value in row.tolist()])
+
+
+def _utc() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def _insight_text(row: EpisodeRow) -> str | None:

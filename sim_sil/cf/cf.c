@@ -191,11 +191,28 @@ static void judge_estimate(ivl_cf_t *cf)
     cf->variance_m2 = told_m * told_m;
 }
 
+/// Voltage that a parameter says, at this thrust; 0: none does.
+static float told_V(const ivl_cf_t *cf, float thrust_N)
+{
+    const float                 empty_V = 0.01f;
+    const ivl_cf_simulation_t  *set = &cf->set.sim;
+    if (set->vbat_V > 0.0f || !(set->cell_V > 0.0f))
+    {
+        return set->vbat_V;
+    }
+    const float loaded_V = set->cell_V - (float)cf->model.raw.battery_sag_VpN * thrust_N;
+    return (loaded_V > empty_V) ? loaded_V : empty_V;
+}
+
 static void draw_power(ivl_cf_t *cf)
 {
     const float weight_N = cf->model.firmware.mass_kg * cf->model.firmware.gravity_mps2;
     const float thrust_N = cf->motor_N[0] + cf->motor_N[1] + cf->motor_N[2] + cf->motor_N[3];
-    ivl_cf_power_step(&cf->power, thrust_N / weight_N, cf->set.sim.vbat_V, cf->set.low_V, IVL_CF_PLANNER_MS);
+    if (cf->set.sim.cell_V > 0.0f && cf->model.raw.battery_voltage_V > 0.0)  // motors of a supply that never sags do not weaken
+    {
+        ivl_cf_world(cf)->rotor.open_circuit_V = (double)cf->set.sim.cell_V;
+    }
+    ivl_cf_power_step(&cf->power, thrust_N / weight_N, told_V(cf, thrust_N), cf->set.low_V, IVL_CF_PLANNER_MS);
 }
 
 /// All that runs beside the stabilizer.

@@ -31,6 +31,7 @@
     LIVE(F32, sil, wall_x,      N, THE.set.sim.wall_x_m, numbers_written) \
     LIVE(F32, sil, wall_y,      N, THE.set.sim.wall_y_m, numbers_written) \
     LIVE(F32, sil, vbat,        N, THE.set.sim.vbat_V, numbers_written) \
+    LIVE(F32, sil, cell,        N, THE.set.sim.cell_V, numbers_written) \
     LIVE(U8,  sil, pose_source, N, THE.set.sim.pose_source, estimation_written) \
     LIVE(U8,  sil, auto_arm,    N, THE.supervisor.auto_arm, NULL) \
     \
@@ -180,7 +181,7 @@
     HELD(F32, ctrlMel, kd_z, CP, 0.4f) \
     HELD(F32, ctrlMel, ki_z, CP, 0.05f) \
     HELD(F32, ctrlMel, i_range_z, P, 0.4f) \
-    HELD(F32, ctrlMel, mass,       CP, 0.029f) \
+    HELD(F32, ctrlMel, mass,       CP, 0.0325f) \
     HELD(F32, ctrlMel, massThrust, CP, 132000.0f) \
     HELD(F32, ctrlMel, kR_xy, CP, 70000.0f) \
     HELD(F32, ctrlMel, kR_z,  CP, 60000.0f) \
@@ -204,7 +205,7 @@
     HELD(U8,  locSrv, enLhMtchStm,       C, 0) \
     HELD(U8,  locSrv, maxTimeLhMtchStm,  C, 25) \
     HELD(U8,  locSrv, minBsLhMtchStm,    C, 2) \
-    HELD(U8,  lighthouse, method,       C, 0) \
+    HELD(U8,  lighthouse, method,       C, 1) \
     HELD(U8,  lighthouse, bsCalibReset, C, 0) \
     HELD(U8,  lighthouse, systemType,   C, 2) \
     HELD(U16, lighthouse, bsAvailable,  CR, 0) \
@@ -282,7 +283,7 @@
     HELD(U8,  activeMarker, back,  CP, 3) \
     HELD(U8,  activeMarker, left,  CP, 4) \
     HELD(U8,  activeMarker, right, CP, 2) \
-    HELD(U8,  activeMarker, mode,  CP, 1)
+    HELD(U8,  activeMarker, mode,  CP, 3)
 
 // ---- LIVE(type, group, name, access, value)   HELD(type, group, name, access, value)
 // with the vehicle cf, its input in, what follows from it e and the truth kin

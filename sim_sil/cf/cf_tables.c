@@ -52,6 +52,7 @@ static void numbers_written(void)
     THE.set.sim.start_y_m = (float)limited((double)THE.set.sim.start_y_m, -50.0, 50.0, 0.0);
     THE.set.sim.start_z_m = (float)limited((double)THE.set.sim.start_z_m, 0.0, ceiling_m - THE.model.reach_m, 0.5 * ceiling_m);
     THE.set.sim.vbat_V = (float)limited((double)THE.set.sim.vbat_V, 0.0, 30.0, 0.0);
+    THE.set.sim.cell_V = (float)limited((double)THE.set.sim.cell_V, 0.0, 30.0, 0.0);
     THE.set.sim.wall_x_m = (float)limited((double)THE.set.sim.wall_x_m, 0.0, 50.0, 0.0);
     THE.set.sim.wall_y_m = (float)limited((double)THE.set.sim.wall_y_m, 0.0, 50.0, 0.0);
     THE.set.takeoff_mps = (float)limited((double)THE.set.takeoff_mps, 0.01, 100.0, 0.5);
@@ -121,10 +122,11 @@ static void system_written(void)
 
 static void place_written(void)
 {
-    if (THE.set.sim.place != 0u)
+    const uint8_t where = THE.set.sim.place;
+    if (where != 0u)
     {
         THE.set.sim.place = 0;
-        ivl_cf_world_place(&THE);
+        ivl_cf_world_place(&THE, where == IVL_CF_PLACE_AT_START);
     }
 }
 

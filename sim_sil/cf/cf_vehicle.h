@@ -21,6 +21,7 @@ enum
     IVL_CF_CONTROLLER_APP = 6,
     IVL_CF_ESTIMATOR_KALMAN = 2,
     IVL_CF_START_AS_FLOWN = 255,
+    IVL_CF_PLACE_AT_START = 2,
     IVL_CF_IDLE_PWM = 7000,  ///< powerDist.idleThrust of a vehicle with brushless motors
     IVL_CF_PLANNER_MS = 10,
     IVL_CF_SUPERVISOR_MS = 40,
@@ -45,6 +46,7 @@ typedef struct
     float    start_x_m, start_y_m, start_z_m;
     float    wall_x_m, wall_y_m;  ///< walls at +- this, 0: none
     float    vbat_V;
+    float    cell_V;  ///< open-circuit voltage of the battery that drives the motors, 0: as the model has it
 } ivl_cf_simulation_t;
 
 /// Parameters that are nothing but numbers.
@@ -210,8 +212,9 @@ void ivl_cf_world_tick(ivl_cf_t *cf);
 /// Hovering at the start point, armed, in flight.
 void ivl_cf_world_reset(ivl_cf_t *cf);
 
-/// Taken by hand from wherever it is, and put down upright on the floor below, its heading kept; what it flew is over.
-void ivl_cf_world_place(ivl_cf_t *cf);
+/// Taken by hand from wherever it is, and put down upright on the floor, its heading kept; what it flew is over.
+/// @param[in] at_start  at (x, y) of the start point, not below where it was
+void ivl_cf_world_place(ivl_cf_t *cf, bool at_start);
 
 // ---- cf_neighbours.c: nothing happens where a vehicle is alone
 

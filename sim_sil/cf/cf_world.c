@@ -89,7 +89,7 @@ void ivl_cf_world_reset(ivl_cf_t *cf)
     }
 }
 
-void ivl_cf_world_place(ivl_cf_t *cf)
+void ivl_cf_world_place(ivl_cf_t *cf, bool at_start)
 {
     const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
     const ivl_rot_t     R = ivl_rot_from_quat(kin.q_WB);
@@ -99,7 +99,8 @@ void ivl_cf_world_place(ivl_cf_t *cf)
     cf->episode.running = false;
     cf->episode.ended = 0;
     start(cf, FLOOR_Z_M);
-    place_on_floor(cf, kin.p_WB_m[0], kin.p_WB_m[1], level);
+    place_on_floor(cf, at_start ? (double)cf->set.sim.start_x_m : kin.p_WB_m[0], at_start ? (double)cf->set.sim.start_y_m : kin.p_WB_m[1],
+                   level);
     memset(ivl_cf_world(cf)->rotor.speed_radps, 0, sizeof ivl_cf_world(cf)->rotor.speed_radps);
     (void)ivl_cf_supervisor_arm(&cf->supervisor, false);
     ivl_cf_planner_stop(&cf->planner);

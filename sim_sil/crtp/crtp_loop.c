@@ -17,6 +17,7 @@ enum
     BURST = 64,            // packets that fit into any client's buffer at once
     WAIT_US_MAX = 100000,  // a signal is noticed within this
     MEET_US = 10000,       // others are answered so often: what they send costs the client nothing
+    PROBE_US = 100000,     // a client who says nothing is sent something so often
     DATAGRAM_BYTES = 256
 };
 
@@ -76,16 +77,26 @@ static void end_session(ivl_crtp_loop_t *loop)
     own_changed(loop);
 }
 
-// Another one wants the vehicle.  A packet to the client shows whether he is still there: if his socket is closed, the system says so.
+// A packet to the client shows whether he is still there: if his socket is closed, the system says so.
+static void probe_client(ivl_crtp_loop_t *loop, uint64_t every_us)
+{
+    if (loop->now_us - loop->probed_us >= every_us)
+    {
+        loop->probed_us = loop->now_us;
+        send_null(loop, loop->session.peer);
+    }
+}
+
+// Another one wants the vehicle.  If the client is silent he has it as soon as all that has come is heard.
 static void meet_foreigner(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
 {
     char text[40];
-    loop->crtp.own.n_foreign++;
-    if (loop->now_us - loop->met_us >= MEET_US)
+    if (ivl_crtp_session_is_silent(&loop->session, loop->now_us))
     {
-        loop->met_us = loop->now_us;
-        send_null(loop, loop->session.peer);
+        return;
     }
+    loop->crtp.own.n_foreign++;
+    probe_client(loop, MEET_US);
     if (ivl_crtp_is_link_source(d) && (loop->now_us - loop->told_us >= MEET_US))
     {
         loop->told_us = loop->now_us;
@@ -127,7 +138,7 @@ static void arrive(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
     }
     if (who == IVL_CRTP_NEW)
     {
-        loop->met_us = loop->told_us = 0;  // the first one who wants this client's place is met at once
+        loop->probed_us = loop->told_us = 0;  // the first one who wants this client's place is met at once
         ivl_crtp_link(&loop->crtp, true);
     }
     if (is_null)
@@ -138,12 +149,18 @@ static void arrive(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
     ivl_crtp_receive(&loop->crtp, d->bytes, d->size);
 }
 
-static void take_waiting(ivl_crtp_loop_t *loop)
+// By radio the dongle asks on when a program says nothing.  Here nobody does: as long as the socket is there, the program is.
+static void look_after_client(ivl_crtp_loop_t *loop)
 {
     ivl_crtp_datagram_t d;
-    if (ivl_crtp_session_expire(&loop->session, loop->now_us))
+    const bool          is_there = ivl_crtp_udp_tells(loop->session.peer) && ivl_crtp_faults_idle(&loop->faults, loop->now_us);
+    if (ivl_crtp_session_expire(&loop->session, loop->now_us, is_there))
     {
         end_session(loop);
+    }
+    if (ivl_crtp_session_is_silent(&loop->session, loop->now_us))
+    {
+        probe_client(loop, PROBE_US);
     }
     if (ivl_crtp_session_next(&loop->session, &d))
     {
@@ -344,7 +361,7 @@ static void turn(ivl_crtp_loop_t *loop)
     receive(loop);
     deliver_delayed(loop);
     tell_faults(loop);
-    take_waiting(loop);
+    look_after_client(loop);
     advance(loop);
 }
 

@@ -24,7 +24,7 @@ typedef struct
     ivl_crtp_faults_t  faults;
     int                fd, control_fd;
     uint64_t           now_us, frozen_until_us, refilled_us;
-    uint64_t           met_us, told_us;        ///< when another client was last met, and was last told who flies
+    uint64_t           probed_us, told_us;     ///< when the client was last sent nothing, and another one was last told who flies
     double             credit, packets_per_s;  ///< packets that may be sent now
     uint32_t           freeze_ms, cut_ms;      ///< that have begun
 } ivl_crtp_loop_t;

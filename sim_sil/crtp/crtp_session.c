@@ -10,7 +10,7 @@ ivl_crtp_who_t ivl_crtp_session_hear(ivl_crtp_session_t *session, uint64_t now_u
     if (session->live && (session->peer != datagram->peer))
     {
         // anything else would be a command that takes effect long after it was given
-        if (ivl_crtp_is_link_source(datagram))
+        if (ivl_crtp_is_link_source(datagram) || ivl_crtp_session_is_silent(session, now_us))
         {
             session->is_waited_for = true;
             session->waiting = *datagram;
@@ -21,12 +21,18 @@ ivl_crtp_who_t ivl_crtp_session_hear(ivl_crtp_session_t *session, uint64_t now_u
     session->live = true;
     session->peer = datagram->peer;
     session->heard_us = now_us;
+    session->is_waited_for = session->is_waited_for && ivl_crtp_is_link_source(&session->waiting);
     return is_new ? IVL_CRTP_NEW : IVL_CRTP_CLIENT;
 }
 
-bool ivl_crtp_session_expire(ivl_crtp_session_t *session, uint64_t now_us)
+bool ivl_crtp_session_is_silent(const ivl_crtp_session_t *session, uint64_t now_us)
 {
-    const bool expired = session->live && (now_us > session->heard_us + IVL_CRTP_SILENCE_US);
+    return session->live && (now_us > session->heard_us + IVL_CRTP_SILENCE_US);
+}
+
+bool ivl_crtp_session_expire(ivl_crtp_session_t *session, uint64_t now_us, bool is_there)
+{
+    const bool expired = ivl_crtp_session_is_silent(session, now_us) && (session->is_waited_for || !is_there);
     session->live = session->live && !expired;
     return expired;
 }

@@ -1,6 +1,7 @@
 /// @file crtp_session.h
-/// Whose vehicle it is.  The first to send something has it, until he is silent for a second or his socket is known to be gone; then the one
-/// who asked last gets it.  Pure: time and addresses are arguments.
+/// Whose vehicle it is.  The first to send something has it, until his socket is known to be gone; then the one who asked last gets it.  Who is
+/// silent for a second gives way to anybody else, and keeps the vehicle only where his socket is known to be there.
+/// Pure: time and addresses are arguments.
 #ifndef IVL_CRTP_SESSION_H
 #define IVL_CRTP_SESSION_H
 #include "crtp_faults.h"
@@ -19,7 +20,8 @@ typedef enum
 {
     IVL_CRTP_CLIENT,  ///< the one who has the vehicle
     IVL_CRTP_NEW,     ///< has it from now on
-    IVL_CRTP_FOREIGN  ///< another one: his packet is passed over; but if it is the first of a connection (15/1), it waits for the client to go
+    IVL_CRTP_FOREIGN  ///< another one: his packet is passed over; but if it is the first of a connection (15/1), it waits for the client to go, and
+                      ///< if the client is silent, any packet waits until all that has come by now is heard
 } ivl_crtp_who_t;
 
 /// The request with which a client begins.
@@ -28,8 +30,12 @@ bool ivl_crtp_is_link_source(const ivl_crtp_datagram_t *datagram);
 /// A packet that says something has come.
 ivl_crtp_who_t ivl_crtp_session_hear(ivl_crtp_session_t *session, uint64_t now_us, const ivl_crtp_datagram_t *datagram);
 
+/// The client has not spoken for a second.
+bool ivl_crtp_session_is_silent(const ivl_crtp_session_t *session, uint64_t now_us);
+
+/// @param is_there  the system would tell if his socket were closed
 /// @return true if the client has just been given up for his silence
-bool ivl_crtp_session_expire(ivl_crtp_session_t *session, uint64_t now_us);
+bool ivl_crtp_session_expire(ivl_crtp_session_t *session, uint64_t now_us, bool is_there);
 
 /// Nobody listens at this address.  @return true if it was the client's, who is given up
 bool ivl_crtp_session_gone(ivl_crtp_session_t *session, uint64_t peer);

@@ -152,6 +152,16 @@ void ivl_crtp_udp_send(int fd, uint64_t peer, const void *bytes, size_t size)
     }
 }
 
+bool ivl_crtp_udp_tells(uint64_t peer)
+{
+#ifdef IP_RECVERR
+    return (peer >> 40) == 127u;  // the machine itself; the packet of another one may be lost, or may never come
+#else
+    (void)peer;
+    return false;
+#endif
+}
+
 void ivl_crtp_udp_wait(int fd_1, int fd_2, uint64_t wait_us)
 {
     struct pollfd         fds[2] = {{.fd = fd_1, .events = POLLIN}, {.fd = fd_2, .events = POLLIN}};

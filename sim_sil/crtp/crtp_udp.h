@@ -24,6 +24,9 @@ ivl_crtp_udp_event_t ivl_crtp_udp_take(int fd, uint8_t *bytes, size_t capacity, 
 /// Sends without waiting.  What the machine cannot take is lost, as on any network.
 void ivl_crtp_udp_send(int fd, uint64_t peer, const void *bytes, size_t size);
 
+/// Whether this system tells when a packet finds nobody at an address.
+bool ivl_crtp_udp_tells(uint64_t peer);
+
 /// Waits for an event on either socket; fd_2 may be -1.
 void ivl_crtp_udp_wait(int fd_1, int fd_2, uint64_t wait_us);
 

@@ -197,12 +197,51 @@ static void test_the_first_has_the_vehicle_until_he_is_silent(void)
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_NEW, hear(1, 0xfd, 0));
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_CLIENT, hear(1, 0x2c, 900000));
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_FOREIGN, hear(2, 0x3c, 1000000));
-    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 1900000));
-    TEST_ASSERT_TRUE(ivl_crtp_session_expire(&session, 1900001));
-    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 9900001));
+    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 1900000, false));
+    TEST_ASSERT_TRUE(ivl_crtp_session_expire(&session, 1900001, false));
+    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 9900001, false));
     // what was no request to connect is not done later
     TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, &d));
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_NEW, hear(2, 0x3c, 2000000));
+}
+
+static void test_who_is_there_keeps_it_in_silence_until_another_comes(void)
+{
+    ivl_crtp_datagram_t d;
+    TEST_ASSERT_EQUAL_INT(IVL_CRTP_NEW, hear(1, 0xfd, 0));
+    TEST_ASSERT_FALSE(ivl_crtp_session_is_silent(&session, 1000000));
+    TEST_ASSERT_TRUE(ivl_crtp_session_is_silent(&session, 1000001));
+    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 9000000, true));
+    TEST_ASSERT_EQUAL_INT(IVL_CRTP_CLIENT, hear(1, 0x2c, 9000000));
+    TEST_ASSERT_EQUAL_INT(IVL_CRTP_FOREIGN, hear(2, 0x2c, 10000000));
+    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 10000001, true));
+    TEST_ASSERT_EQUAL_INT(IVL_CRTP_FOREIGN, hear(2, 0x2c, 10000001));
+    TEST_ASSERT_TRUE(ivl_crtp_session_expire(&session, 10000002, true));
+    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_EQUAL_UINT64(2, d.peer);
+}
+
+// a vehicle that was stopped for long hears all that has come before it judges
+static void test_nobody_takes_it_from_one_who_spoke_while_nobody_listened(void)
+{
+    ivl_crtp_datagram_t d;
+    (void)hear(1, 0xfd, 0);
+    TEST_ASSERT_EQUAL_INT(IVL_CRTP_FOREIGN, hear(2, 0x3c, 5000000));
+    TEST_ASSERT_EQUAL_INT(IVL_CRTP_CLIENT, hear(1, 0x2c, 5000000));
+    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 5000000, true));
+    TEST_ASSERT_TRUE(ivl_crtp_session_gone(&session, 1));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, &d));
+}
+
+static void test_who_is_silent_gives_way_to_one_who_has_asked(void)
+{
+    ivl_crtp_datagram_t d;
+    (void)hear(1, 0xfd, 0);
+    (void)hear(2, 0xfd, 500000);
+    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 1000000, true));
+    TEST_ASSERT_TRUE(ivl_crtp_session_expire(&session, 1000001, true));
+    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_EQUAL_UINT64(2, d.peer);
 }
 
 static void test_who_asks_to_connect_is_next(void)
@@ -305,6 +344,9 @@ int main(void)
     RUN_TEST(test_the_same_seed_gives_the_same_faults_another_gives_others);
     RUN_TEST(test_a_cut_loses_all_until_it_ends);
     RUN_TEST(test_the_first_has_the_vehicle_until_he_is_silent);
+    RUN_TEST(test_who_is_there_keeps_it_in_silence_until_another_comes);
+    RUN_TEST(test_who_is_silent_gives_way_to_one_who_has_asked);
+    RUN_TEST(test_nobody_takes_it_from_one_who_spoke_while_nobody_listened);
     RUN_TEST(test_who_asks_to_connect_is_next);
     RUN_TEST(test_who_has_gone_meanwhile_is_not_next);
     RUN_TEST(test_paced_time_does_not_drift);

@@ -33,6 +33,17 @@ static void test_contact_is_sensed_from_the_threshold_on_in_any_direction(void)
     TEST_ASSERT_FALSE(contact.contact);
 }
 
+static void test_limits_belong_to_contact_and_to_hanging(void)
+{
+    cfg.gravity_mps2 = 10.0f;
+    feel(cfg.contact_accel_mps2, 0.0f, 0.0f);
+    TEST_ASSERT_TRUE(contact.contact);
+    feel(0.0f, 0.0f, -5.0f);
+    TEST_ASSERT_TRUE(contact.hang_s > 0.0f);
+    feel(0.0f, 0.0f, nextafterf(-5.0f, 0.0f));
+    TEST_ASSERT_FALSE(contact.hang_s > 0.0f);
+}
+
 static void test_full_thrust_of_a_flip_is_no_contact(void)
 {
     feel(0.0f, 0.0f, 2.0f * cfg.motor_thrust_N_max / cfg.mass_kg);
@@ -88,6 +99,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_contact_is_sensed_from_the_threshold_on_in_any_direction);
+    RUN_TEST(test_limits_belong_to_contact_and_to_hanging);
     RUN_TEST(test_full_thrust_of_a_flip_is_no_contact);
     RUN_TEST(test_contact_is_not_sensed_when_the_sample_is_not_fresh);
     RUN_TEST(test_hanging_needs_reversed_gravity_for_the_stated_duration);

@@ -11,6 +11,7 @@ typedef struct
     double a_mps2, t_s, d_m, v_mps, bias_mps2;
     double rrev_period_s, rrev_delay_s, range_period_s, range_delay_s;
     double tilt_rad;
+    double q_WB[4];  ///< attitude, if it is not that tilt: x, y, z, w
 } run_t;
 
 static double speed_at(const run_t *r, double t)
@@ -67,6 +68,14 @@ static double range_at(const run_t *r, double t)
     return distance_at(r, t) / cos(r->tilt_rad);
 }
 
+/// The same force, seen from any attitude: the third row of its matrix.
+static void lean(ivl_in_t *in, const double q[4], double up)
+{
+    in->q_WB = (ivl_quat_t){(float)q[0], (float)q[1], (float)q[2], (float)q[3]};
+    in->f_B_mps2 = ivl_vec3((float)(up * 2.0 * (q[0] * q[2] - q[1] * q[3])), (float)(up * 2.0 * (q[1] * q[2] + q[0] * q[3])),
+                            (float)(up * (1.0 - 2.0 * (q[0] * q[0] + q[1] * q[1]))));
+}
+
 /// One tick of the stage alone.
 static ivl_ceiling_t advance(run_t *r)
 {
@@ -83,6 +92,10 @@ static ivl_ceiling_t advance(run_t *r)
     // a force straight up in W, seen from a body that leans about b_y
     const double up = 9.81 + a;
     in->f_B_mps2 = ivl_vec3((float)(-up * sin(r->tilt_rad)), 0.0f, (float)(up * cos(r->tilt_rad)));
+    if (r->q_WB[0] > 0.0)
+    {
+        lean(in, r->q_WB, up);
+    }
     tell(r->t_s, r->rrev_period_s, r->rrev_delay_s, &in->rrev, rrev_at, r);
     tell(r->t_s, r->range_period_s, r->range_delay_s, &in->range, range_at, r);
     ivl_sense_update(&r->fix.cfg, &r->fix.state.sense, in, (float)TICK_S);
@@ -118,6 +131,54 @@ static void test_the_filter_knows_distance_and_speed_at_constant_speed_with_late
         TEST_ASSERT_FLOAT_WITHIN(0.12f, (float)r.v_mps, seen.v_close_mps);
         TEST_ASSERT_TRUE((seen.d_sigma_m > 0.0f) && (seen.d_sigma_m < 0.06f));
         TEST_ASSERT_TRUE(fabsf(seen.d_ceil_m - (float)r.d_m) < 3.0f * seen.d_sigma_m);
+    }
+}
+
+static void test_the_filter_knows_them_from_any_attitude(void)
+{
+    run_t r;
+    begin(&r, IVL_SOURCE_FILTER);
+    const double q[4] = {0.4, -0.2, 0.5, sqrt(0.55)};
+    memcpy(r.q_WB, q, sizeof q);
+    const ivl_ceiling_t seen = advance_to(&r, 0.52);
+    TEST_ASSERT_TRUE(seen.valid);
+    TEST_ASSERT_FLOAT_WITHIN(0.03f, (float)r.d_m, seen.d_ceil_m);
+    TEST_ASSERT_FLOAT_WITHIN(0.05f, 0.0f, r.fix.state.distance.filter.b_mps2);
+}
+
+static void test_an_estimate_begins_with_what_the_pose_says(void)
+{
+    run_t r;
+    begin(&r, IVL_SOURCE_FILTER);
+    r.fix.cfg.kf_d_sigma_m = 0.1f;
+    r.fix.state.sense.sample.p_WB_m = ivl_vec3(0.3f, -0.4f, 1.2f);
+    r.fix.state.sense.sample.v_WB_mps = ivl_vec3(0.7f, -0.5f, 1.3f);
+    const ivl_sense_t *sense = &r.fix.state.sense;
+    (void)ivl_distance_update(&r.fix.cfg, &r.fix.state.distance, sense, &r.fix.in, true, (float)TICK_S);
+    TEST_ASSERT_EQUAL_FLOAT(1.3f, r.fix.state.distance.filter.v_mps);
+    TEST_ASSERT_EQUAL_FLOAT(2.7f - 1.2f, r.fix.state.distance.filter.d_m);
+}
+
+static void test_nothing_is_shown_before_the_first_measurement_however_certain_it_would_be(void)
+{
+    const ivl_source_t sources[] = {IVL_SOURCE_FILTER, IVL_SOURCE_RANGE};
+    for (int i = 0; i < 2; i++)
+    {
+        run_t r;
+        begin(&r, sources[i]);
+        r.rrev_period_s = 0.0;
+        r.fix.cfg.kf_d_sigma_m = 0.001f;
+        r.fix.cfg.d_sigma_norm_max = 10.0f;
+        r.fix.cfg.d_old_s_max = 1.0f;
+        for (int n = 0; n < 20; n++)
+        {
+            (void)advance(&r);
+            // away from the ceiling: a distance that grows from nothing
+            r.fix.state.sense.sample.v_WB_mps.z = -5.0f;
+            const ivl_ceiling_t seen =
+                ivl_distance_update(&r.fix.cfg, &r.fix.state.distance, &r.fix.state.sense, &r.fix.in, true, (float)TICK_S);
+            TEST_ASSERT_FALSE(seen.valid);
+        }
     }
 }
 
@@ -171,6 +232,22 @@ static void test_the_formula_holds_while_accelerating_and_is_invalid_at_constant
     TEST_ASSERT_FLOAT_WITHIN(0.06f, (float)r.d_m, early.d_ceil_m);
     TEST_ASSERT_FLOAT_WITHIN(0.15f, (float)r.v_mps, early.v_close_mps);
     TEST_ASSERT_FALSE(advance_to(&r, 0.5).valid);
+}
+
+/// Constant acceleration is what the formula is exact for: late readings are carried on by it.
+static void test_the_formula_carries_late_readings_on(void)
+{
+    run_t r;
+    begin(&r, IVL_SOURCE_FORMULA);
+    r.fix.cfg.rrev_sigma_per_s = 0.001f;
+    r.fix.cfg.rrev_sigma_norm = 0.0f;
+    r.fix.cfg.rrev_tau_s = 0.0f;
+    r.rrev_delay_s = 0.04;
+    r.fix.cfg.rrev_delay_s = 0.04f;
+    const ivl_ceiling_t seen = advance_to(&r, 1.05);
+    TEST_ASSERT_TRUE(seen.valid);
+    TEST_ASSERT_FLOAT_WITHIN(0.01f, (float)r.d_m, seen.d_ceil_m);
+    TEST_ASSERT_FLOAT_WITHIN(0.05f, (float)r.v_mps, seen.v_close_mps);
 }
 
 static void test_what_is_too_uncertain_or_old_is_invalid(void)
@@ -294,10 +371,14 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_the_filter_knows_distance_and_speed_at_constant_speed_with_late_readings);
+    RUN_TEST(test_the_filter_knows_them_from_any_attitude);
+    RUN_TEST(test_an_estimate_begins_with_what_the_pose_says);
+    RUN_TEST(test_nothing_is_shown_before_the_first_measurement_however_certain_it_would_be);
     RUN_TEST(test_a_delay_that_nobody_told_is_an_error_of_many_centimetres);
     RUN_TEST(test_the_bias_of_the_accelerometer_is_carried);
     RUN_TEST(test_ranges_are_turned_upright_and_carried_on);
     RUN_TEST(test_the_formula_holds_while_accelerating_and_is_invalid_at_constant_speed);
+    RUN_TEST(test_the_formula_carries_late_readings_on);
     RUN_TEST(test_what_is_too_uncertain_or_old_is_invalid);
     RUN_TEST(test_an_estimate_begins_anew_with_each_approach_and_shows_nothing_outside);
     RUN_TEST(test_readings_that_make_no_sense_are_not_looked_at);

@@ -59,6 +59,10 @@ static void test_guards(void)
     TEST_ASSERT_FALSE(ivl_formula_compute(&cfg, 1.0f, NAN, 4.0f, 0.0f, 0.0f, 0.0f).valid);
     TEST_ASSERT_FALSE(ivl_formula_compute(&cfg, 1.0f, 9.0f, NAN, 0.0f, 0.0f, 0.0f).valid);
     TEST_ASSERT_TRUE(ivl_formula_compute(&cfg, 1.0f, 9.0f, 4.0f, 0.0f, 0.0f, 0.0f).valid);
+    // without a limit of the acceleration there is no distance without acceleration all the same
+    cfg.accel_mps2_min = 0.0f;
+    TEST_ASSERT_FALSE(ivl_formula_compute(&cfg, 1.0f, 9.0f, 0.0f, 0.0f, 0.0f, 0.0f).valid);
+    TEST_ASSERT_TRUE(ivl_formula_compute(&cfg, 1.0f, 9.0f, 0.1f, 0.0f, 0.0f, 0.0f).valid);
 }
 
 // RREV of a motion with constant acceleration, sampled: what the low-passes show is the distance of some time ago
@@ -104,6 +108,17 @@ static void test_nothing_is_told_before_the_low_passes_have_settled(void)
     }
 }
 
+static void test_two_readings_are_too_few_however_far_apart_they_are(void)
+{
+    ivl_formula_t formula;
+    ivl_formula_start(&formula);
+    for (int i = 0; i < 4; i++)
+    {
+        TEST_ASSERT_EQUAL_INT(i > 2, ivl_formula_distance(&cfg, &formula).valid);
+        ivl_formula_push(&cfg, &formula, 0.3f * (float)i, 0.3f, 4.0f);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -112,5 +127,6 @@ int main(void)
     RUN_TEST(test_guards);
     RUN_TEST(test_sampled_rrev_gives_the_distance_of_a_stated_time_ago);
     RUN_TEST(test_nothing_is_told_before_the_low_passes_have_settled);
+    RUN_TEST(test_two_readings_are_too_few_however_far_apart_they_are);
     return UNITY_END();
 }

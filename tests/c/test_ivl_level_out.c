@@ -39,6 +39,17 @@ static void test_rise_is_that_of_a_mass_whose_thrust_fades(void)
     }
 }
 
+static void test_a_thrust_below_the_least_lift_adds_nothing(void)
+{
+    ivl_cfg_defaults(&fix.cfg);
+    fix.cfg.motor_lag_s = 0.03f;
+    const float kept_mps2 = IVL_LIFT_NORM_MIN * fix.cfg.gravity_mps2;
+    const float expected_m = 4.0f / (2.0f * (fix.cfg.gravity_mps2 - kept_mps2));
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, expected_m, ivl_level_out_rise_m(&fix.cfg, 2.0f, kept_mps2));
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, expected_m, ivl_level_out_rise_m(&fix.cfg, 2.0f, 0.0f));
+    TEST_ASSERT_TRUE(ivl_level_out_rise_m(&fix.cfg, 2.0f, 1.1f * kept_mps2) > expected_m);
+}
+
 static void test_no_rise_without_closing_speed(void)
 {
     ivl_cfg_defaults(&fix.cfg);
@@ -74,6 +85,18 @@ static void climb(float v_mps)
         fix_tick(&fix);
         assert_output_sane(&fix);
     }
+}
+
+static void test_the_speed_along_the_ceiling_is_braked_in_its_own_direction(void)
+{
+    approach(0.5f, -3.0f, 20.0f);
+    climb(2.0f);
+    assert_phase(IVL_PHASE_LEVEL_OUT, &fix);
+    fix.in.v_WB_mps = ivl_vec3(0.9f, -0.6f, 0.0f);
+    fix_tick(&fix);
+    const float left = 1.0f - fix.cfg.approach_accel_mps2 / fix.cfg.tick_hz / sqrtf(0.9f * 0.9f + 0.6f * 0.6f);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.9f * left, fix.state.level.vx_mps);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, -0.6f * left, fix.state.level.vy_mps);
 }
 
 static float room_needed_m(float v_mps)
@@ -513,7 +536,9 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_rise_is_that_of_a_mass_whose_thrust_fades);
+    RUN_TEST(test_a_thrust_below_the_least_lift_adds_nothing);
     RUN_TEST(test_no_rise_without_closing_speed);
+    RUN_TEST(test_the_speed_along_the_ceiling_is_braked_in_its_own_direction);
     RUN_TEST(test_no_go_is_decided_at_the_last_moment);
     RUN_TEST(test_no_go_is_decided_at_the_trigger_if_that_comes_first);
     RUN_TEST(test_a_go_at_the_last_moment_is_not_taken_back);

@@ -114,6 +114,26 @@ static void test_flip_is_recorded_with_what_was_before_it(void)
     }
 }
 
+static void test_a_row_holds_each_component_of_what_was_sensed(void)
+{
+    ivl_record_init(&recorder);
+    start_approach(10);
+    fix.in.p_WB_m = ivl_vec3(0.11f, -0.22f, 1.6f);
+    fix.in.v_WB_mps = ivl_vec3(0.33f, -0.44f, 2.5f);
+    fix.in.q_WB = (ivl_quat_t){0.1f, -0.2f, 0.3f, 0.92736185f};
+    fix.in.w_B_radps = ivl_vec3(1.0f, -2.0f, 3.0f);
+    fix.in.f_B_mps2 = ivl_vec3(0.5f, -0.6f, 9.0f);
+    tick();
+    assert_phase(IVL_PHASE_FLIP, &fix);
+    ticks(1000);
+    read_all();
+    const int16_t expected[16] = {110, -220, 1600, 330, -440, 2500, 3277, -6553, 9830, 30387, 32, -64, 96, 50, -60, 900};
+    for (uint32_t i = 0; i < 16; i++)
+    {
+        TEST_ASSERT_INT16_WITHIN(1, expected[i], (int16_t)row_at(number_at(8, 2), 4u + 2u * i, 2));
+    }
+}
+
 /// Minutes of hover after a no-go must not push the decision out of the ring.
 static void test_a_no_go_is_recorded_with_its_decision_and_its_highest_point(void)
 {
@@ -278,6 +298,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_header_can_be_read_before_anything_is_recorded);
     RUN_TEST(test_flip_is_recorded_with_what_was_before_it);
+    RUN_TEST(test_a_row_holds_each_component_of_what_was_sensed);
     RUN_TEST(test_a_no_go_is_recorded_with_its_decision_and_its_highest_point);
     RUN_TEST(test_the_next_approach_of_the_same_cycle_is_a_recording_of_its_own);
     RUN_TEST(test_row_holds_the_values_in_their_units);

@@ -17,6 +17,8 @@ from ivl.site import place
 from ivl.source import Plan
 
 sys.path.insert(0, str(Path(__file__).parent))
+from rehearsed import Days, fly_both
+
 assert ivl.__version__
 
 
@@ -60,6 +62,12 @@ def furnish(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Experiment], 
 def in_room(vertical: Experiment, furnish: Callable[[Experiment], Experiment]) -> Experiment:
     """The same in a room."""
     return furnish(vertical)
+
+
+@pytest.fixture(scope="session")
+def days(tmp_path_factory: pytest.TempPathFactory) -> Days:
+    """A rehearsed day of sixty flights with every kind of fault, continued on a second day."""
+    return fly_both(tmp_path_factory.mktemp("cage"))
 
 
 @pytest.fixture

@@ -35,7 +35,21 @@ def learn(answers: list[str], *words: str) -> int:
     Path("answers.txt").write_text("\n".join(answers))
     settings = [word for text in (*SETTINGS, *GRID) for word in ("--set", text)]
     first = ["experiments/paper_flight.yaml", *settings, "--site", "lab.yaml"] if "--resume" not in words else []
-    return cli.run(["learn", *first, "--out", "run", "--rehearse", "--answers", "answers.txt", *words, "--json"])
+    return cli.run(
+        [
+            "learn",
+            *first,
+            "--out",
+            "run",
+            "--rehearse",
+            "--script",
+            "calm",
+            "--answers",
+            "answers.txt",
+            *words,
+            "--json",
+        ]
+    )
 
 
 def test_a_day_is_rehearsed_stopped_and_resumed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -47,14 +61,14 @@ def test_a_day_is_rehearsed_stopped_and_resumed(folder: Path, capsys: pytest.Cap
     assert kept["overrides"]["world.ceiling_height"]["value"] == 2.1
     assert (folder / "run" / kept["site"]).read_bytes() == site_file.TEMPLATE.read_bytes()
     (folder / "lab.yaml").unlink()
-    landing = ["discard", "fly 3", "3", "touched", "fly 4", "0", "clean"]
+    landing = ["discard", "go on", "fly 3", "3", "touched", "fly 4", "0", "clean"]
     assert learn(["fly 3", *landing], "--resume") == 0
     result = json.loads(capsys.readouterr().out)
     assert (result["rollouts"], result["discarded"]) == (3, 1)
     assert result["warnings"][-1] == "flights that do not count, by cause: discarded 1"
     journal = [json.loads(line) for line in (folder / "run" / "flights.jsonl").read_text().splitlines()]
     assert [line["what"].partition(":")[0] for line in journal] == [
-        "flown", "vetoed", "discarded", "flown", "flown",
+        "flown", "vetoed", "discarded", "not begun", "flown", "flown",
     ]  # fmt: skip
     assert [line.get("n_legs") for line in journal if line["what"] == "flown"] == [4, 3, 0]
     assert len(list((folder / "run" / "recordings").iterdir())) == 3

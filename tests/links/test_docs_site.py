@@ -4,8 +4,10 @@ import re
 from pathlib import Path
 
 from ivl import experiment, yamlfile
+from ivl.links import forecast
 from ivl.links.sites import room
 from ivl.links.trouble import STATES
+from ivl.rehearsal.script import FAULTS
 from ivl.site import checks
 from ivl.site import file as site_file
 from ivl.site.file import MEASURED, SiteFile
@@ -30,6 +32,12 @@ def test_checks_are_those_of_the_code(tmp_path: Path) -> None:
     assert told[1:] == [check.name for check in made]
 
 
+def test_faults_of_a_rehearsed_day_are_those_of_the_code() -> None:
+    table = PAGE.partition("## The rehearsed day")[2].partition("## ")[0]
+    told = re.findall(r"^\| `(\w+)` \| ([^|]+) \| ([^|]+) \|$", table, re.MULTILINE)
+    assert told == [(row.kind, row.happens, row.cause or "-") for row in FAULTS]
+
+
 def test_every_field_is_told() -> None:
     fields = [path for path in yamlfile.paths(SiteFile) if not path.startswith("mocap.")]
     told = PAGE.partition("## Fields")[2].partition("## ")[0]
@@ -45,7 +53,8 @@ def test_numbers_are_those_of_the_code() -> None:
         f"{checks.FENCE_MARGIN_M:g} m inside the fence",
         f"along the approach {checks.FLIP_S:g} s of its speed more",
         f"full duty is {checks.HOVER_RESERVE:g} of the weight",
-        f"expects of {room.FORECASTS} landings",
+        f"expects of {forecast.N} landings",
+        f"how many of {forecast.N} land",
     ):
         assert text in TEXT, text
     assert room.AWAY_S == 120.0, "two minutes"

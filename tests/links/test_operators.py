@@ -15,12 +15,16 @@ from rich.console import Console
 
 from ivl import forms
 from ivl.links import operators
-from ivl.links.operators import ConsoleOperator, Forecast, OperatorStopped, Seen, Upcoming
-from ivl.links.trouble import STATES, Cause, Vetoed, state_of
+from ivl.links.forecast import Forecast
+from ivl.links.operators import ConsoleOperator, OperatorStopped, Seen, Upcoming
+from ivl.links.trouble import STATES, Cause, Instead, Vetoed, state_of
 from ivl.links.truth import Resting
 
 RESTING = Resting((0.0, 0.0, 2.0), (0.0, 0.0, -1.0))
-NEXT = Upcoming(17, 160, forms.by_name("constant"), (4.2, 7.5), Forecast(64, 60, 3), (0.0, 0.0, 1.0), (0.5, -0.2))
+NEXT = Upcoming(
+    17, 160, forms.by_name("constant"), (4.2, 7.5), [(0.0, 7.0), (0.0, 9.5)], Forecast(64, 60, 3), (0.0, 0.0, 1.0),
+    (0.5, -0.2),
+)  # fmt: skip
 
 
 def operator(*answers: str) -> tuple[ConsoleOperator, io.StringIO]:
@@ -56,9 +60,11 @@ def test_no_wrong_key_arms() -> None:
 def test_no_random_line_arms() -> None:
     rng = random.Random(3)
     lines = ["".join(rng.choices("fly 17\tfly" + string.printable, k=rng.randrange(0, 9))) for _ in range(2000)]
-    lines = [line for line in lines if " ".join(line.split()) not in ("fly 17", "veto", "stop") and "\n" not in line]
-    asked, _ = operator(*lines)
-    with pytest.raises(OperatorStopped, match="no more answers"):
+    known = ("fly 17", "veto", "instead", "stop")
+    lines = [line for line in lines if " ".join(line.split()) not in known and "\n" not in line]
+    lines.append("stop")
+    asked = ConsoleOperator(Console(quiet=True), countdown_s=0, read=iter(lines).__next__)
+    with pytest.raises(OperatorStopped, match="stopped by the operator"):
         asked.place(NEXT)
 
 
@@ -103,6 +109,19 @@ def test_stop_is_a_word_everywhere_and_return_is_none(question: Callable[[Consol
     with pytest.raises(OperatorStopped, match="stopped by the operator"):
         question(asked)
     assert told.getvalue().count("not understood") == 3
+
+
+def test_another_policy_is_flown_instead_if_it_is_within_the_bounds() -> None:
+    wrong = ["", "4", "4 5 6", "4,1 5", "4 x", "nan 5", "7.01 5", "4 -0.1", "inf inf", "fly 17"]
+    asked, told = operator("instead", *wrong, "6.5  1.25")
+    with pytest.raises(Instead) as raised:
+        asked.place(NEXT)
+    assert raised.value.theta == (6.5, 1.25)
+    assert told.getvalue().count("not understood") == len(wrong)
+    assert "take-off" not in told.getvalue()
+    asked, _ = operator("instead", "stop")
+    with pytest.raises(OperatorStopped):
+        asked.place(NEXT)
 
 
 def test_an_outcome_is_typed_and_not_taken_from_the_suggestion() -> None:

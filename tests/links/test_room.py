@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ivl import experiment, forms, native
-from ivl.errors import ConfigError, LinkError, RolloutError
+from ivl import experiment, forms, native, run
+from ivl.errors import ConfigError, LinkError, RolloutError, StoreError
 from ivl.experiment import Experiment
 from ivl.links import preflight, sil
 from ivl.links.crazyflie import CrazyflieSource
@@ -188,7 +188,7 @@ def test_nothing_but_the_operator_ends_a_day(
 ) -> None:
     """Preflight refusals are no attempts: forty of them in a row, and the policy is flown all the same."""
     refused = iter(range(40))
-    fit = type(source._site)._make_fit
+    fit = Room._make_fit
 
     def make_fit(site: Room) -> None:
         if next(refused, None) is not None:
@@ -430,3 +430,27 @@ def test_tracking_judges_where_it_is_sure(
     resting = Resting((0.0, 0.0, 2.0), (0.0, 0.0, -1.0))
     assert site._judge(Seen(n_legs, False), resting, "", is_tracked).n_legs == n_legs
     assert bool(script.asked) is asked
+
+
+def test_a_run_goes_on_over_another_link_with_another_vehicle_and_says_so(
+    in_room: Experiment, script: Script, tmp_path: Path
+) -> None:
+    """Two software vehicles of the same file, each on a port of its own; no simulator goes on where a vehicle flew."""
+    chosen = in_room.model_copy(update={"n_rollouts": 2, "budget": 2})
+    world, notes = chosen.make_world(), []
+    script.n_flights = 1
+
+    def fly(uri: str, resume: bool, **options: bool) -> None:
+        flight = Options(operator=script, say=print, **options)
+        run.run(chosen, tmp_path / "run", resume=resume, hooks=run.Hooks(on_note=notes.append), uri=uri, flight=flight)
+
+    with SilProcess(world, seed=1) as first, pytest.raises(OperatorStopped):
+        fly(first.uri, resume=False, rehearse=True)
+    script.n_flights = 1
+    with SilProcess(world, seed=2) as second:
+        fly(second.uri, resume=True, rehearse=True)
+        with pytest.raises(StoreError, match="it is flown in a room, and now would be not flown in a room"):
+            fly(second.uri, resume=True, other_world=True)
+    assert f"the link was {first.uri}, and is {second.uri}" in notes
+    assert any(note.startswith("the vehicle was 00515649") and note.endswith("2") for note in notes)
+    assert script.asked.count("place") == 2

@@ -15,6 +15,7 @@ from ivl.experiment import Experiment
 from ivl.links import crazyflie, preflight, sil, sites
 from ivl.links.clock import FINE, Clock, LockStep
 from ivl.links.crazyflie import CrazyflieSource
+from ivl.links.forecast import Forecasts
 from ivl.links.landing_flight import FlyingEnds, Landing, Outcome, Rollout, safe_or_why
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Recording
@@ -38,7 +39,7 @@ GOOD = (4.8, 8.0)
 class Hall:
     """A site of these tests: the software vehicle comes by air, nobody is asked, and its own recorder judges."""
 
-    contact_is_seen, battery_is_flown = False, False
+    contact_is_seen, is_flown, battery_is_flown = False, True, False
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         self._vehicle, self._visit = vehicle, visit
@@ -219,7 +220,8 @@ def test_a_drone_behind_any_link_needs_a_room_that_is_measured_and_tracked(
     camera = mocap_config.load("vicon")
 
     def enter(chosen: Experiment, place: SiteFile | None, **options: bool) -> Room:
-        visit = Visit(chosen, chosen.make_world(), Options(**options), place, None, print)
+        world = chosen.make_world()
+        visit = Visit(chosen, world, Options(**options), place, None, Forecasts(world, chosen), print)
         return Room(Elsewhere(), visit)  # type: ignore[arg-type]
 
     assert enter(in_room, site)

@@ -91,6 +91,10 @@ def test_the_resolved_text_reads_back_as_the_same_experiment(small: Experiment, 
         ("overrides", {"sense.latency": 0.01}, "overrides.sense.latency"),
         ("seed", -1, "small.yaml: seed: value -1"),
         ("name", "a/b", "small.yaml: name: value 'a/b'"),
+        ("name", "..", "small.yaml: name: value '..'"),
+        ("name", ".hidden", "small.yaml: name: value '.hidden'"),
+        ("name", "-x", "small.yaml: name: value '-x'"),
+        ("name", "x" * 65, "small.yaml: name: value 'xxx"),
     ],
 )
 def test_a_faulty_experiment_is_refused_in_one_line(small_data: Data, path: str, value: Any, message: str) -> None:

@@ -355,6 +355,32 @@ def test_a_setting_reaches_into_the_section_by_the_name_of_a_parameter() -> None
         experiment.load(TRANSFER, ["family.known=['bdy.*']"])
 
 
+def test_members_that_fly_may_have_values_that_no_learner_knows() -> None:
+    settings = ["family.member=3", "family.member_overrides={aero.drag_z: 0.05, leg.length: 0.04}"]
+    odd, plain = experiment.load(TRANSFER, settings), experiment.load(TRANSFER, settings[:1])
+    odd_values, plain_values = (one.make_world().params.values for one in (odd, plain))
+    differs = {name for name, value in plain_values.items() if odd_values[name] != value}
+    assert differs == {"aero.drag_z", "leg.length"}
+    assert (odd_values["aero.drag_z"], odd_values["leg.length"]) == (0.05, 0.04)
+    kin = family.of(odd.nominal_world_of(odd.gear), odd.family)
+    assert kin.world.params.values["aero.drag_z"] != 0.05
+    assert kin.draw(np.random.default_rng(0))[1].params.values["leg.length"] == kin.world.params.values["leg.length"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "complaint"),
+    [
+        ("{leg.length: 9.0}", "family.member_overrides.leg.length: value 9 is out of range (allowed "),
+        ("{leg.lenth: 0.1}", "family.member_overrides: leg.lenth: unknown parameter, did you mean 'leg.length'?"),
+    ],
+)
+def test_a_wrong_value_of_the_members_that_fly_is_said(overrides: str, complaint: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        experiment.load(TRANSFER, ["family.member=3", f"family.member_overrides={overrides}"]).make_world()
+    assert complaint in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+
+
 def test_the_family_changes_nothing_of_the_world_that_is_flown() -> None:
     choices = [experiment.load(TRANSFER, ["family.member=null", *s]) for s in ([], ["family.scale=3.0"])]
     worlds = [chosen.make_world() for chosen in choices]

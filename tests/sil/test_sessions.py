@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -80,6 +81,29 @@ def test_log_blocks_go_with_a_silent_client(sil, Raw, wait_for):
         # the client does not speak for a second: then the vehicle is another's, and there is no such block
         assert other.ask("fd00")[1:9] == b"Bitcraze"
         assert other.ask("5d030101") == bytes.fromhex("5d030102")
+
+
+def test_one_who_only_listens_keeps_his_log_blocks(sil, Raw, wait_for):
+    """As by radio, where the dongle asks on when the program says nothing."""
+    with Raw(sil.uri) as client:
+        client.connect()
+        client.ask("5d0601010000")
+        client.ask("5d030101")  # every 10 ms
+        seen = 0
+        began = time.monotonic()
+        while time.monotonic() < began + 2.5:
+            seen += client.receive()[0] & 0xF3 == 0x52
+        assert seen > 150  # 250, if this machine has nothing else to do
+        assert sil.get("radio.isConnected") == 1
+    wait_for("a closed socket to be noticed", lambda: sil.get("radio.isConnected") == 0)
+
+
+def test_silence_over_a_bad_link_is_a_lost_link(sil, Raw, wait_for):
+    with Raw(sil.uri) as client:
+        client.connect()
+        assert sil.get("radio.isConnected") == 1
+        sil.set("fault.delay_ms", 1.0)
+        wait_for("the end of the link", lambda: sil.get("radio.isConnected") == 0)
 
 
 def test_eight_vehicles_at_once(world, connected):

@@ -81,7 +81,7 @@ def make(
     rng = np.random.Generator(np.random.PCG64(seed))
     drawn = [wide.draw(rng) for _ in range(n_members)]
     z = SPREAD * np.array([z for z, _ in drawn])
-    theta, near, pick = _policies(rng, flight.bounds, n_members, n_flights)
+    theta, near, pick = _policies(rng, flight.box, n_members, n_flights)
     parts = [(0, max(1, round(_BROAD * n_members))), (max(1, round(_BROAD * n_members)), n_members)]
     if policies is not None:
         theta, parts = policies(z, rng), [(0, n_members)]
@@ -91,7 +91,7 @@ def make(
             landings = np.concatenate([t[r[0]] for t, r in zip(theta, results, strict=False)]) if results else None
             if landings is not None and len(landings):
                 chosen = landings[(pick[first:last] * len(landings)).astype(np.intp)]
-                moved = np.clip(chosen + near[first:last], *flight.bounds.T)
+                moved = np.clip(chosen + near[first:last], *flight.box.T)
                 theta[first:last] = np.where(np.isfinite(moved), moved, theta[first:last])
             seeds = [derive_member(seed, i) for i in range(first, last)]
             worlds = [drawn[i][1] for i in range(first, last)]

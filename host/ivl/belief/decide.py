@@ -29,6 +29,8 @@ TIMING_S, MOMENT = 0.010, 0.10
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _N_RREV, _N_MOMENT, _N_NEAR = 57, 12, 60
 _LEAST_AHEAD_S = 1e-3
+_N_FIRST, _HOPELESS = 16, 0.01
+"""A first look with so many particles leaves out the policies whose rate is below this."""
 
 
 def perturbed(theta: FloatArray, late_s: npt.ArrayLike, moment: npt.ArrayLike, bounds: FloatArray) -> FloatArray:
@@ -68,7 +70,10 @@ def safest(
     sizes = (_N_RREV, _N_MOMENT)
     axes = tuple(np.linspace(lo, hi, size) for (lo, hi), size in zip(bounds.tolist(), sizes, strict=True))
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-    surface = rate(belief, corrected, grid).reshape(_N_RREV, _N_MOMENT)
+    flat = corrected(grid, belief.rates(grid, _N_FIRST).mean(axis=0))
+    likely = flat >= min(_HOPELESS, float(flat.max()))
+    flat[likely] = rate(belief, corrected, grid[likely])
+    surface = flat.reshape(_N_RREV, _N_MOMENT)
     points, weights = around(grid, bounds)
     smooth = weights @ RegularGridInterpolator(axes, surface)(points.reshape(-1, 2)).reshape(len(weights), -1)
     best = grid[int(smooth.argmax())]

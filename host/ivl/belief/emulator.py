@@ -242,15 +242,22 @@ class LandingEmulator:
     spread: FloatArray
     nets: Sequence[Net]
 
-    def inputs(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
+    def inputs(
+        self, z: FloatArray, theta: FloatArray, conditions: FloatArray, recorded: FloatArray | None = None
+    ) -> FloatArray:
         """Member, flight, and what it is expected to record: the motion decides the landing."""
         s = self.recordings.scale(theta, conditions)
-        expected = (self.recordings.mean(z, theta, conditions) - self.centre) / self.spread
-        return np.concatenate([z, s, s[:, : theta.shape[1]] ** 2, expected], axis=1)
+        mean = self.recordings.mean(z, theta, conditions) if recorded is None else recorded
+        return np.concatenate([z, s, s[:, : theta.shape[1]] ** 2, (mean - self.centre) / self.spread], axis=1)
 
-    def rate(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
-        """P(landed), shape (n,), of members z, shape (n, d), in flights, shape (n, ...)."""
-        u = self.inputs(z, theta, conditions)
+    def rate(
+        self, z: FloatArray, theta: FloatArray, conditions: FloatArray, recorded: FloatArray | None = None
+    ) -> FloatArray:
+        """P(landed), shape (n,), of members z, shape (n, d), in flights, shape (n, ...).
+
+        `recorded` is what they are expected to record, shape (n, n_used), if it is known already.
+        """
+        u = self.inputs(z, theta, conditions, recorded)
         return np.asarray(np.mean([expit(forward(net, u)[:, 0]) for net in self.nets], axis=0))
 
 

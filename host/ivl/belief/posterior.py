@@ -40,7 +40,7 @@ _DIFFERENCE, _JITTER, _WHOLE = 2.38, 0.02, 0.1
 """Difference step: its length times sqrt(2 d), its noise, and the share of steps that are a whole difference."""
 _BETA_FACTORS = (0.3, 1.0, 1.7)
 _EFFECTIVE, _HALVINGS, _LEAST_STEP = 0.5, 20, 1e-3
-_RATED = 128
+RATED = 128
 """Particles that tell landing rates; more of them say the same, and a decision asks for thousands of policies."""
 _GOLDEN, _TINY = 0.6180339887498949, 1e-6
 _N_CONDITIONS, _P_MIN, _ROWS_MAX = 9, 1e-6, 20_000
@@ -123,17 +123,18 @@ class Belief:
         """Log-likelihood of all flights, and of the first `n_old` of them, shape (len(z),) each."""
         n, n_z = len(evidence.theta), len(z)
         flights = np.repeat(z, n, axis=0), np.tile(evidence.theta, (n_z, 1)), np.tile(evidence.conditions, (n_z, 1))
-        residual = evidence.features[None] - self._recordings.mean(*flights).reshape(n_z, n, -1)
-        p = self._expected(flights).reshape(n_z, n)
+        recorded = self._recordings.mean(*flights)
+        residual = evidence.features[None] - recorded.reshape(n_z, n, -1)
+        p = self._expected(flights, recorded).reshape(n_z, n)
         right = np.where(evidence.landed, p, 1.0 - p)
         outcome = np.log((1.0 - self._trust.lapse) * right + self._trust.lapse / 2.0)
         parts = [outcome[:, :k].sum(axis=1) + self._motion(residual[:, :k]) if k else np.zeros(n_z) for k in (n, n_old)]
         return np.asarray(parts[0]), np.asarray(parts[1])
 
-    def _expected(self, flights: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
+    def _expected(self, flights: tuple[FloatArray, FloatArray, FloatArray], recorded: FloatArray) -> FloatArray:
         """Landing rate in flights, shape (n,): averaged over conditions that are unknown."""
         z, theta, conditions = flights
-        p = self._landings.rate(z, theta, conditions)
+        p = self._landings.rate(z, theta, conditions, recorded)
         unknown = ~np.isfinite(conditions[:, self._recordings.scale.sigma > 0.0]).all(axis=1)
         if unknown.any():
             at = (np.arange(_N_CONDITIONS) + 0.5) / _N_CONDITIONS
@@ -213,12 +214,12 @@ class Belief:
         proposal = self.z + length * (one - other) + _JITTER * self._rng.standard_normal((n, d))
         return proposal, 0.5 * (self.z**2 - proposal**2).sum(axis=1)
 
-    def rates(self, theta: FloatArray) -> FloatArray:
-        """Landing rate of policies, shape (m, dim), of particles, shape (at most `_RATED`, m).
+    def rates(self, theta: FloatArray, n_most: int = RATED) -> FloatArray:
+        """Landing rate of policies, shape (m, dim), of particles, shape (at most `n_most`, m).
 
         Each particle flies under other conditions, spread as in the bank.
         """
-        n = min(len(self.z), _RATED)
+        n = min(len(self.z), n_most)
         at = np.arange(n)
         quantiles = np.stack([(at + 0.5) / n, (0.5 + at * _GOLDEN) % 1.0], axis=1)
         conditions = np.repeat(self._recordings.scale.conditions(quantiles), len(theta), axis=0)

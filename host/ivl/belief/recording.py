@@ -1,4 +1,6 @@
-"""What a flight records of its flip, as a vector of features: in simulation (`simulated`), or by its recorder.
+"""What a flight records of its flip, as a vector of features.
+
+In simulation (`simulated`), by its recorder (`of_recorder`), or in a log that was imported (`of_flip`).
 
     pitch, rate, fall     at `TIMES_S` after the trigger, up to the first contact
     at_contact            time after the trigger, pitch, rate and fall at the first contact
@@ -21,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl import forms
+from ivl.flight.motion import Flip
 from ivl.outcome import Outcomes
 from ivl.world import Trace, World
 
@@ -58,12 +61,16 @@ voltage that was averaged over a hover."""
 class Flight:
     """What all flights of one task have in common.
 
+    What differs from flight to flight are its numbers theta: the policy, and behind it the approach if there is more
+    than one.
+
     Attributes:
         speed_mps: Approach speed.
         angle_deg: Approach angle.
         form: Form of the policy.
         start: How a rollout begins.
         bounds: Box of the policies, shape (dim, 2), in the units of the form.
+        approaches: Box of speed and angle, shape (2, 2), in place of the one approach; None: there is one.
     """
 
     speed_mps: float
@@ -71,6 +78,19 @@ class Flight:
     form: str
     start: str
     bounds: FloatArray
+    approaches: FloatArray | None = None
+
+    @property
+    def box(self) -> FloatArray:
+        """Box of theta, shape (dim, 2), or (dim + 2, 2) with more than one approach."""
+        return self.bounds if self.approaches is None else np.concatenate([self.bounds, self.approaches])
+
+    def of(self, theta: FloatArray) -> tuple[float, float, list[float]]:
+        """Speed, angle and policy of a flight with theta, shape (n,)."""
+        numbers = theta.tolist()
+        if self.approaches is None:
+            return self.speed_mps, self.angle_deg, numbers
+        return numbers[-2], numbers[-1], numbers[:-2]
 
 
 def simulated(world: World, flight: Flight, theta: FloatArray, seed: int, stream: int) -> tuple[FloatArray, Outcomes]:
@@ -79,15 +99,16 @@ def simulated(world: World, flight: Flight, theta: FloatArray, seed: int, stream
     Args:
         world: The vehicle.
         flight: What is flown.
-        theta: Policy, shape (dim,).
+        theta: Policy, and the approach if there is more than one, see `Flight`.
         seed: Seed of the rollout and of the noise of its recording.
         stream: Number of the rollout within the seed.
 
     Returns:
         Features, shape (N,), and the outcome, shape (1,).
     """
+    speed_mps, angle_deg, policy = flight.of(theta)
     trace = world.trace(
-        flight.speed_mps, flight.angle_deg, *theta.tolist(), form=flight.form, start=flight.start,
+        speed_mps, angle_deg, *policy, form=flight.form, start=flight.start,
         seed=seed, stream=stream, period_s=_TRACE_PERIOD_S,
     )  # fmt: skip
     rng = np.random.Generator(np.random.PCG64([seed, stream]))
@@ -157,6 +178,31 @@ def of_recorder(
     if not contact_is_seen:
         features[[NAMES.index(name) for name in AT_CONTACT]] = np.nan
     return features
+
+
+def of_flip(flip: Flip, battery_V: float = np.nan, overshoot: float = np.nan) -> FloatArray:
+    """Features of the flip of a flight that was imported (`ivl.flight`), shape (N,).
+
+    Args:
+        flip: Its flip.
+        battery_V: Voltage in the hover before the approach; NaN is unknown.
+        overshoot: Share by which the logged RREV was above the threshold at the trigger; NaN is unknown.
+    """
+    at = flip.is_new_pose | (np.arange(len(flip.t_s)) == 0)
+    t_s = np.concatenate([[-_CLOSING_BEFORE_S, 0.0], flip.t_s])
+    before_m = flip.h_plane_m - np.asarray(flip.state.p_W_m)[2]
+    climb_mps = float(np.asarray(flip.state.v_W_mps)[2])
+    later_m = flip.h_plane_m - np.interp(flip.t_s, flip.t_s[at], flip.height_m[at])
+    distance = np.concatenate([[before_m + climb_mps * _CLOSING_BEFORE_S, before_m], later_m])
+    return _features(
+        t_s,
+        np.concatenate([np.full(2, flip.pitch_deg[0]), flip.pitch_deg]),
+        np.concatenate([np.full(2, flip.rate_radps[0]), flip.rate_radps]),
+        distance,
+        np.full(len(t_s), climb_mps),
+        flip.t_contact_s,
+        (battery_V, overshoot if abs(overshoot) < _OVERSHOOT_MAX else np.nan),
+    )
 
 
 def _between_poses(t_s: FloatArray, held: FloatArray) -> FloatArray:

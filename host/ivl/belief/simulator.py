@@ -100,11 +100,11 @@ def _fitted(
         return (lambda done, _: progress(first + done, n_members)) if progress else None
 
     flown = bank.make(kin, flight, half, _FLIGHTS, _SEED, threads, told(0))
-    rough = emulator.fit_recordings(flown, emulator.Scale.of(flown, flight.bounds))
+    rough = emulator.fit_recordings(flown, emulator.Scale.of(flown, flight.box))
     expected = emulator.fit_landings(flown, rough, epochs=_ROUGH_EPOCHS)
-    policies = partial(_promising, expected, flight.bounds)
+    policies = partial(_promising, expected, flight.box)
     flown = flown + bank.make(kin, flight, n_members - half, _FLIGHTS, _SEED + 1, threads, told(half), policies)
-    recordings = emulator.fit_recordings(flown, emulator.Scale.of(flown, flight.bounds))
+    recordings = emulator.fit_recordings(flown, emulator.Scale.of(flown, flight.box))
     return recordings, emulator.fit_landings(flown, recordings)
 
 
@@ -157,7 +157,11 @@ def _digest(kin: Family, flight: Flight, n_members: int) -> str:
         "dimensions": [asdict(d) for d in kin.dimensions],
         "root": kin.root.tolist(),
         "scale": kin.scale,
-        "flight": {f.name: np.asarray(getattr(flight, f.name)).tolist() for f in fields(flight)},
+        "flight": {f.name: _plain(getattr(flight, f.name)) for f in fields(flight)},
         "sizes": [n_members, _FLIGHTS, _SEED],
     }
     return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:24]
+
+
+def _plain(value: object) -> object:
+    return value.tolist() if isinstance(value, np.ndarray) else value

@@ -14,6 +14,7 @@ import typer
 
 from ivl import __version__, files
 from ivl.cli import (
+    amend,
     bench,
     can_gateway,
     console,
@@ -82,6 +83,7 @@ app.command("can-gateway", help=can_gateway.HELP, short_help="Carry the link of 
 app.command("flash", help=flash.HELP)(flash.flash)
 app.command("stop", help=stop.HELP, short_help="Stop a vehicle that flies now.")(stop.stop)
 app.add_typer(site.app, name="site", short_help="Describe the room in which a drone flies.")
+app.add_typer(amend.app, name="run", short_help="Amend the outcome of a flown landing.")
 app.add_typer(family.app, name="family", short_help="Show the vehicles that a task may be flown with.")
 app.add_typer(policy.app, name="policy", short_help="Learn, show and judge policies for every approach.")
 app.add_typer(flight.app, name="flight", short_help="Import, replay, compare and identify recorded flights.")

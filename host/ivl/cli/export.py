@@ -13,7 +13,8 @@ from ivl.export.source import Choice, resolve
 HELP = """Write a LANDING as a file for other tools: MCAP (Foxglove, PlotJuggler), Bitcraze's CSV, Rerun's .rrd.
 
 LANDING is a run folder, a specification (.yaml with the options of `ivl rollout`), a trace of `ivl rollout --trace`
-or the table of a flight recorder (.csv, .npz). Landings of runs and specifications are flown again, bit for bit.
+or the table of a flight recorder (.csv, .npz). Landings of simulated runs and specifications are flown again, bit for
+bit; of a run that a vehicle has flown its recordings are written.
 
 \b
 Examples:
@@ -40,6 +41,9 @@ def export(
     vehicle: Annotated[str | None, typer.Option(help="Recorded vehicle; see `ivl list vehicles`.")] = None,
     speed: Annotated[float | None, typer.Option(help="Approach speed of a sweep's cell, m/s.")] = None,
     angle: Annotated[float | None, typer.Option(help="Approach angle of a sweep's cell, degrees.")] = None,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="Of a flown rollout its simulated counterpart, not its recording.")
+    ] = False,
     layouts: Annotated[bool, typer.Option("--layouts", help="Also write the layouts for Foxglove and PlotJuggler.")] =
         False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
@@ -47,7 +51,7 @@ def export(
     """Export a landing; HELP is the text that people see."""
     path = out or _default_path(landing, kind)
     try:
-        flight = resolve(landing, Choice(trial, rollout, gear, gear_set, vehicle, speed, angle))
+        flight = resolve(landing, Choice(trial, rollout, gear, gear_set, vehicle, speed, angle, simulated or None))
         write(flight, path, kind)
     except ModuleNotFoundError as error:
         raise IvlError(f"{error.name} is not installed: pip install 'ivl[report,sweep]'") from error

@@ -46,7 +46,9 @@ and replaces it:
     member: null                                            fly this one, 0 or more; null: the vehicle of the files;
                                                             each: trial k of ivl learn --trials N flies member k
     member_scale: 1.0                                       factor on the spread of the members that fly, not of the
-                                                            family that a learner is told
+                                                            family that a learner knows
+    member_overrides: {aero.drag_xy: 0.1}                   values of the members that fly, whatever was drawn; a
+                                                            learner does not know them
 
 A parameter that --set gives a value is known, and is not drawn.
 

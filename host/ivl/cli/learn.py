@@ -18,6 +18,7 @@ from ivl.site import require
 if TYPE_CHECKING:
     from ivl.links.operators import Operator
     from ivl.live.board import Board
+    from ivl.rehearsal.script import Script
 
 HELP = """Learn to land: run an EXPERIMENT and judge what it learned.
 
@@ -94,8 +95,13 @@ def learn(
     mocap: Annotated[
         str | None, typer.Option(metavar="CONFIG", help="Track the vehicle; file or name, see `ivl mocap --list`.")
     ] = None,
+    script: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="What goes wrong on a rehearsed day: a file, default, or calm."),
+    ] = None,
     answers: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Answers of a rehearsal's operator, one a line.")
+        str | None,
+        typer.Option(metavar="FILE", help="Answers of a rehearsal's operator, one a line; or script: it answers."),
     ] = None,
     other_world: Annotated[
         bool, typer.Option("--other-world", help="Also fly a software vehicle that simulates another world.")
@@ -107,7 +113,9 @@ def learn(
 ) -> None:
     """Learn to land; HELP is the text that people see."""
     chosen, n_trials = _choose(path, seed, trials, learner, settings or [], policy_file, out, resume, site)
-    uri = require.link_of(chosen, uri) or (f"{links.REHEARSAL_SCHEME}://" if rehearse else None)
+    uri = require.link_of(chosen, uri, site if path is None else None) or (
+        f"{links.REHEARSAL_SCHEME}://" if rehearse else None
+    )
     if uri is not None:
         require.for_flight(chosen, uri, rehearse)
     folder = out or run.default_folder(chosen, n_trials, resume)
@@ -117,6 +125,8 @@ def learn(
             mocap=site_options.tracker(chosen, uri, mocap, rehearse),
             rehearse=rehearse,
             operator=_operator(answers, rehearse, board if links.is_vehicle(uri) else None),
+            script=_script(script, uri),
+            answered_by_script=_answers_itself(answers, rehearse, uri),
             other_world=other_world,
             start_hint=_start_hint(path or str(folder / "config.yaml"), _said(settings, site), uri or ""),
             say=console.say,
@@ -141,7 +151,44 @@ def learn(
         raise failure
 
 
-def _operator(answers: Path | None, rehearse: bool, board: "Board | None") -> "Operator | None":
+_BY_SCRIPT = "script"
+"""What `--answers` says for a rehearsal whose script answers."""
+
+
+def _script(name: str | None, uri: str | None) -> "Script | None":
+    """What goes wrong on a rehearsed day; None: it is none with a vehicle of its own.
+
+    Raises:
+        ConfigError: There is no such script, or nothing that it could happen to.
+    """
+    if not _is_own(uri):
+        if name is not None:
+            raise ConfigError(f"--script {name}: a script is for a rehearsal (--rehearse) without --uri")
+        return None
+    from ivl.rehearsal import script as scripts  # its modules load much of the links
+
+    return scripts.load(name or scripts.DEFAULT)
+
+
+def _is_own(uri: str | None) -> bool:
+    """Whether a rehearsal starts its software vehicle itself."""
+    return uri is not None and uri.startswith(links.REHEARSAL_SCHEME)
+
+
+def _answers_itself(answers: str | None, rehearse: bool, uri: str | None) -> bool:
+    """Whether the script answers, and not a person.
+
+    Raises:
+        ConfigError: There is no script that could.
+    """
+    if answers != _BY_SCRIPT:
+        return False
+    if not (rehearse and _is_own(uri)):
+        raise ConfigError("--answers script: only a rehearsal (--rehearse) without --uri has a script that answers")
+    return True
+
+
+def _operator(answers: str | None, rehearse: bool, board: "Board | None") -> "Operator | None":
     """The operator at the terminal, or of a rehearsal whose answers are in a file; None: nobody special.
 
     Args:
@@ -152,13 +199,13 @@ def _operator(answers: Path | None, rehearse: bool, board: "Board | None") -> "O
     Raises:
         ConfigError: It is no rehearsal, or the file cannot be read.
     """
-    if answers is None and board is None:
+    if answers == _BY_SCRIPT or (answers is None and board is None):
         return None
     if answers is not None and not rehearse:
         raise ConfigError(f"--answers {answers}: only a rehearsal (--rehearse) is answered from a file")
     from ivl.links import operators  # its modules load cflib
 
-    read = operators.read_line if answers is None else operators.answers_of(answers)
+    read = operators.read_line if answers is None else operators.answers_of(Path(answers))
     countdown_s = operators.COUNTDOWN_S if answers is None else 0
     return operators.ConsoleOperator(console.err, countdown_s, read if board is None else board.reader(read))
 
@@ -188,10 +235,10 @@ def _choose(
         raise ConfigError(
             "EXPERIMENT is missing (only `--resume --out FOLDER` goes without); see: ivl list experiments"
         )
-    if settings or learner or policy_file or site or seed is not None or trials is not None:
+    if settings or learner or policy_file or seed is not None or trials is not None:
         raise ConfigError(
             "--resume without EXPERIMENT takes all from the run folder: "
-            "leave out --set, --learner, --policy, --site, --seed and --trials"
+            "leave out --set, --learner, --policy, --seed and --trials"
         )
     return run.read_config(out)
 
@@ -256,16 +303,36 @@ def _lines_of_one(result: run.RunResult) -> list[tuple[str, str]]:
     summary, experiment = result.summary, result.experiment
     found = zip(experiment.policy.shape.params, summary["mu"], summary["sigma"], strict=True)
     reached = summary["rollouts_to_convergence"]
+    flown = summary.get("flown")
+    by = " (judged by the simulator)" if flown else ""
     return [
-        ("solved", f"yes, after {reached} rollouts" if summary["solved"] else "no"),
+        *([] if flown is None else _lines_of_flown(flown)),
+        ("solved", (f"yes, after {reached} rollouts" if summary["solved"] else "no") + by),
         *((p.symbol, f"{mu:.2f} ± {sigma:.2f} {p.unit}") for p, mu, sigma in found),
         ("landing rate, last three episodes", _rates(summary["landing_rate_four_leg"], summary["landing_rate_clean"])),
-        ("of the recommended policy", _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"])),
+        (
+            "of the recommended policy" + (", simulated" if flown else ""),
+            _rates(summary["recommended_rate_four_leg"], summary["recommended_rate_clean"]),
+        ),
         *margin.lines(summary["margin"], result.best, experiment),
         *([] if summary["model_fits"] is None else [("model", console.MODEL_FITS[summary["model_fits"]])]),
         ("failed landings until convergence", str(summary["failed_landings"])),
         ("failed landings in all", f"{summary['failed_landings_total']} of {summary['rollouts']} rollouts"),
     ]
+
+
+def _lines_of_flown(flown: dict[str, Any]) -> list[tuple[str, str]]:
+    """What the vehicle has flown, before anything that is simulated."""
+    interval = f"95 %: {console.percent(flown['rate_lo'])} .. {console.percent(flown['rate_hi'])}"
+    lines = [
+        ("flown: landed on four legs", f"{flown['landed']} of {flown['landings']} ({console.percent(flown['rate'])}, "
+                                       f"{interval}); simulated, the same policies: "
+                                       f"{console.percent(flown['simulated_rate'])}"),
+    ]  # fmt: skip
+    if flown["pitch_rms_deg_median"] is not None:
+        text = f"pitch {flown['pitch_rms_deg_median']:.1f} deg rms, median of the flips"
+        lines.append(("recorded against simulated", text))
+    return lines
 
 
 def _lines_of_trials(summary: dict[str, Any]) -> list[tuple[str, str]]:

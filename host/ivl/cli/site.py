@@ -7,6 +7,7 @@ import typer
 
 from ivl import experiment
 from ivl.cli import console
+from ivl.rehearsal import script as scripts
 from ivl.site import checks
 from ivl.site import file as site_file
 
@@ -20,6 +21,8 @@ Examples:
       what is not measured yet, and what does not fit
   ivl site check lab.yaml experiments/paper_flight.yaml
       whether this experiment can be flown there: runway, board, thrust at the battery's voltage
+  ivl site script day.yaml
+      what goes wrong on a rehearsed day, to be changed
   ivl learn experiments/paper_flight.yaml --site lab.yaml --uri site
       fly it, over the link of the file
 """
@@ -33,6 +36,13 @@ def new(file: File) -> None:
     """Write a commented site file to fill in."""
     site_file.write_new(file)
     console.out.print(f"{file}: measure what it names under not_measured, then: ivl site check {file}")
+
+
+@app.command("script")
+def script(file: Annotated[Path, typer.Argument(metavar="FILE", help="File to write.")]) -> None:
+    """Write the script of a rehearsed day, to be changed: what goes wrong, and in which rollout."""
+    scripts.write_new(file)
+    console.out.print(f"{file}: ivl learn EXPERIMENT --site SITE --rehearse --script {file}")
 
 
 @app.command("check")

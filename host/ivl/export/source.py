@@ -1,15 +1,17 @@
 """Where a landing to export comes from: a run folder, a specification, a trace file, a flight recorder's table."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ivl import landing, native, run
+from ivl import flown, landing, native, run
 from ivl.errors import ConfigError, StoreError
+from ivl.experiment import Experiment
 from ivl.export.flight import Flight, of_file, of_spec
 from ivl.landing import LandingSpec
-from ivl.learning.recorder import SCORED
+from ivl.learning.recorder import SCORED, RolloutRows
+from ivl.outcome import as_dict
 from ivl.rewards import RewardChoice
 from ivl.store import RunStore, read_manifest
 from ivl.world import World
@@ -27,6 +29,7 @@ class Choice:
         vehicle: Vehicle that a file is about.
         speed_mps: Approach speed of a sweep's cell.
         angle_deg: Approach angle of a sweep's cell.
+        simulated: Of a flown rollout its simulated counterpart, and not its recording.
     """
 
     trial: int | None = None
@@ -36,6 +39,7 @@ class Choice:
     vehicle: str | None = None
     speed_mps: float | None = None
     angle_deg: float | None = None
+    simulated: bool | None = None
 
     def given(self) -> list[str]:
         """Names of what was said."""
@@ -52,7 +56,7 @@ def resolve(source: Path, choice: Choice) -> Flight:
     if source.is_dir():
         if "sweep" in read_manifest(source):
             return of_spec(*_of_sweep(source, choice))
-        return of_spec(*_of_learn(source, choice))
+        return _of_learn(source, choice)
     if not source.is_file():
         raise ConfigError(f"{source}: no such file or run folder")
     if source.suffix in (".yaml", ".yml"):
@@ -65,9 +69,14 @@ def resolve(source: Path, choice: Choice) -> Flight:
     return of_file(source, World(**shapes))
 
 
-def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str, RewardChoice]:
-    """A rollout of a run of `ivl learn`: the one that was asked for, or that with the largest return."""
-    _allow(choice, ("trial", "rollout"), f"{folder} is a run of `ivl learn`")
+def _of_learn(folder: Path, choice: Choice) -> Flight:
+    """A rollout of a run of `ivl learn`: the one that was asked for, or that with the largest return.
+
+    What a vehicle has flown is its recording; what the simulator has flown is flown again.
+    """
+    is_flown = bool(read_manifest(folder).get("flown"))
+    allowed = ("trial", "rollout", *(["simulated"] if is_flown else []))
+    _allow(choice, allowed, f"{folder} is a run of `ivl learn`")
     experiment, n_trials = run.read_config(folder)
     trial = choice.trial or 0
     if trial >= (n_trials or 1):
@@ -80,9 +89,28 @@ def _of_learn(folder: Path, choice: Choice) -> tuple[LandingSpec, str, RewardCho
     row = int(scored[np.argmax(rollouts.reward[scored])]) if choice.rollout is None else choice.rollout
     if row >= len(rollouts):
         raise ConfigError(f"--rollout {row}: trial {trial} of {folder} has rollouts 0 .. {len(rollouts) - 1}")
-    theta = rollouts.theta[row].tolist()
-    spec = landing.of_rollout(experiment, trial, theta, int(rollouts.stream[row]))
-    return spec, f"{experiment.name}, trial {trial}, rollout {row}", experiment.reward
+    spec, path = flown.counterpart(folder, experiment, rollouts, row)
+    title = f"{experiment.name}, trial {trial}, rollout {row}"
+    if not is_flown:
+        return of_spec(spec, title, experiment.reward)
+    if choice.simulated:
+        return of_spec(spec, f"{title}, SIMULATED counterpart of a flown landing", experiment.reward)
+    if not path.is_file():
+        raise ConfigError(f"{folder}: rollout {row} has no recording ({path.name}); --simulated has its counterpart")
+    return _of_recording(path, experiment, rollouts, row, f"{title}, as recorded")
+
+
+def _of_recording(path: Path, experiment: Experiment, rollouts: RolloutRows, row: int, title: str) -> Flight:
+    """The recording of a flown rollout, with what the run knows of it."""
+    world = experiment.make_world()
+    flight = of_file(path, world)
+    record = rollouts.outcomes[row]
+    facts = {f"outcome.{k}": str(v) for k, v in as_dict(record, world.end_reason(int(record["end_reason"]))).items()}
+    facts |= {
+        f"spec.{p.name}": str(v) for p, v in zip(experiment.policy.shape.params, rollouts.theta[row], strict=True)
+    }
+    said = {"source": "flight recorder of the vehicle", "judged_by": "operator", "file": path.name}
+    return replace(flight, title=title, facts={**facts, **said})
 
 
 def _of_sweep(folder: Path, choice: Choice) -> tuple[LandingSpec, str, RewardChoice]:

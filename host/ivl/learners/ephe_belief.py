@@ -44,6 +44,7 @@ class EpheBeliefOptions(EpheMemoryOptions):
     wide: float = Field(default=3.0, ge=1, le=10, description="factor on that size while the alarm is on")
     local_length: float = Field(default=0.2, gt=0, le=10, description="its lengths, in units of sigma0")
     discrepancy: float = Field(default=1.0, ge=0, le=10, description="factor on the errors allowed to any model")
+    n_full: float = Field(default=3.0, ge=1, le=10_000, description="flights whose motion counts in full, all told")
 
 
 class EpheBelief(EpheMemory):
@@ -62,7 +63,8 @@ class EpheBelief(EpheMemory):
 
     def begin(self, simulator: Simulator) -> None:
         """Start from simulated vehicles; before the first `ask` or `load_state_dict`."""
-        trust = Trust(lapse=self.options.lapse, discrepancy=self.options.discrepancy)
+        given = self.options
+        trust = Trust(lapse=given.lapse, discrepancy=given.discrepancy, n_full=given.n_full)
         self._belief = simulator.belief(self._rng, self.options.n_particles, trust)
         self._simulator = simulator
         self._at_first = self._quantiles()
@@ -87,7 +89,7 @@ class EpheBelief(EpheMemory):
             return None
         kin = self._simulator.kin
         return {
-            "expected_rate": float(decide.rate(self._belief, self._corrected, self._choice[None])[0]),
+            "expected_rate": float(self.expected_rates(self._choice[None])[0]),
             "margin_rate": self._margin_rate,
             "model_fits": bool(self.model_fits),
             "surprise": self.surprise,
@@ -99,6 +101,17 @@ class EpheBelief(EpheMemory):
             },
             "predicted": self._predicted,
         }
+
+    @property
+    def particles(self) -> FloatArray:
+        """Vehicles that are believed in, shape (n_particles, n_dimensions), see `ivl.family`; only with a belief."""
+        assert self._belief is not None
+        return self._belief.z
+
+    def expected_rates(self, theta: FloatArray) -> FloatArray:
+        """Landing rates that are expected now of policies, shape (n, dim): shape (n,); only with a belief."""
+        assert self._belief is not None
+        return decide.rate(self._belief, self._corrected, theta)
 
     def _quantiles(self) -> list[list[float]]:
         """Quantiles of each parameter of the family over the particles."""
@@ -152,7 +165,7 @@ class EpheBelief(EpheMemory):
             raise LearnerError(f"tell: meta[{LANDED!r}] is missing: a belief must be told which rollouts landed")
         landed = meta[LANDED].astype(bool)
         self._predicted = self._predict(theta[0], features[0, recording.CONDITIONS])
-        self._foreseen = np.append(self._foreseen, decide.rate(self._belief, self._corrected, theta))
+        self._foreseen = np.append(self._foreseen, self.expected_rates(theta))
         self._theta = np.vstack([self._theta, theta])
         self._features = np.vstack([self._features, emulator.used(features)])
         self._conditions = np.vstack([self._conditions, features[:, recording.CONDITIONS]])

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -58,21 +59,23 @@ class LearningRun:
     def __init__(
         self,
         trials: Sequence[Experiment],
-        source: RolloutSource,
+        source: RolloutSource | None,
         recorder: Recorder,
         simulator: Simulator | None = None,
         earlier: Earlier | None = None,
         threads: int = 1,
+        begin_anew: bool = False,
     ) -> None:
         """Start, or continue where the recorder stands.
 
         Args:
             trials: What each trial is; they have budget, episodes and reward in common.
-            source: Where their rollouts come from.
+            source: Where their rollouts come from; None: nothing is flown.
             recorder: Keeps what they do.
             simulator: Simulated vehicles, for learners that begin with them.
             earlier: Flights that the learners are told before the first episode.
             threads: So many learners think at the same time; worth it where each thinks long.
+            begin_anew: The learners have no state yet, whatever the recorder has (`tell_again`).
         """
         self._threads = threads
         self._first, self._source, self._recorder = trials[0], source, recorder
@@ -81,7 +84,7 @@ class LearningRun:
         for learner in self._learners:
             if simulator is not None and isinstance(learner, EpheBelief):
                 learner.begin(simulator)
-        states = recorder.learner_states()
+        states = {} if begin_anew else recorder.learner_states()
         for number, learner in enumerate(self._learners):
             if number in states:
                 learner.load_state_dict(states[number])
@@ -111,6 +114,21 @@ class LearningRun:
                 rate = self._n_flown / max(time.monotonic() - began, 1e-9)
                 on_episode(Progress(episode + 1, n_episodes, rows, recent_rate(self._history), self._n_flown, rate))
 
+    def tell_again(self, trial: int) -> tuple[list[EpisodeRow], dict[str, Any]]:
+        """Tell the learner of a trial every finished episode as it is stored now; returns the episodes and its state.
+
+        It asks as it did before, so that its random numbers go on as they would have; what it asks for now is not
+        flown.
+        """
+        learner, rows = self._learners[trial], []
+        finished = [row.episode for row in self._history if row.trial == trial]
+        for episode in finished:
+            learner.ask()
+            rows.append(self._learn(episode, self._recorder.rollouts(episode=episode), trial))
+        if len(self._recorder.rollouts(episode=len(finished)).of_trial(trial)):  # planned, and not told yet
+            learner.ask()
+        return rows, learner.state_dict()
+
     def _fly_episode(self, episode: int, active: list[int]) -> list[EpisodeRow]:
         rollouts = self._recorder.rollouts(episode=episode)
         if not len(rollouts):
@@ -132,9 +150,12 @@ class LearningRun:
         still = np.flatnonzero(rollouts.status == PLANNED)
         trial = rollouts.trial[still]
         plan = Plan(rollouts.theta[still], self._world_seed[trial], rollouts.stream[still], trial)
+        assert self._source is not None
         for flown in self._source.fly(plan):
             rows = still[flown.index]
             terms = self._first.reward.score(flown.outcomes)
+            if flown.theta is not None:
+                self._recorder.fly_instead(episode, rollouts.trial[rows], rollouts.idx[rows], flown.theta)
             self._recorder.score(
                 episode,
                 rollouts.trial[rows],
@@ -147,18 +168,16 @@ class LearningRun:
             self._n_flown += len(rows)
 
     def _tell(self, episode: int, active: list[int], rollouts: RolloutRows) -> list[EpisodeRow]:
-        scored, four, spotless = rollouts.status == SCORED, four_leg(rollouts.outcomes), clean(rollouts.outcomes)
-
-        def learn(trial: int) -> EpisodeRow:
-            chosen = (rollouts.trial == trial) & scored
-            outcomes, learner = rollouts.outcomes[chosen], self._learners[trial]
-            meta = meta_of(outcomes, None if rollouts.recordings is None else rollouts.recordings[chosen])
-            learner.tell(rollouts.theta[chosen], rollouts.reward[chosen], meta)
-            return _episode_row(trial, episode, learner, rollouts.reward[chosen], four[chosen], spotless[chosen])
-
-        rows = self._in_turn(learn, active)
+        rows = self._in_turn(partial(self._learn, episode, rollouts), active)
         self._recorder.finish_episode(rows, self._states(active))
         return rows
+
+    def _learn(self, episode: int, rollouts: RolloutRows, trial: int) -> EpisodeRow:
+        """Tell one learner what counts of an episode of all trials."""
+        own = rollouts.of_rows((rollouts.trial == trial) & (rollouts.status == SCORED))
+        learner = self._learners[trial]
+        learner.tell(own.theta, own.reward, meta_of(own.outcomes, own.recordings))
+        return _episode_row(trial, episode, learner, own.reward, four_leg(own.outcomes), clean(own.outcomes))
 
     def _in_turn(self, do: Callable[[int], T], trials: Sequence[int]) -> list[T]:
         """Let each learner think, in threads if that is worth it; each has random numbers of its own."""

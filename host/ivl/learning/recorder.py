@@ -55,7 +55,10 @@ class RolloutRows:
 
     def of_trial(self, number: int) -> "RolloutRows":
         """Those of one trial."""
-        own = self.trial == number
+        return self.of_rows(self.trial == number)
+
+    def of_rows(self, own: npt.NDArray[Any]) -> "RolloutRows":
+        """Some of them: a mask of shape (n,), or their places."""
         arrays = {
             field.name: getattr(self, field.name)[own]
             for field in fields(self)
@@ -82,6 +85,31 @@ class EpisodeRow:
     rate_clean: float
     stopped: bool
     insight: dict[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Amendment:
+    """A change that a person made to what a rollout says, kept with what it said before.
+
+    Attributes:
+        trial: Trial of the rollout.
+        episode: Episode within the trial.
+        idx: Place within the episode.
+        utc: When.
+        who: By whom.
+        why: Why.
+        before: What was changed, as it was: field and value.
+        after: The same, as it is.
+    """
+
+    trial: int
+    episode: int
+    idx: int
+    utc: str
+    who: str
+    why: str
+    before: dict[str, Any]
+    after: dict[str, Any]
 
 
 class Recorder(Protocol):
@@ -115,6 +143,19 @@ class Recorder(Protocol):
             stream: Random stream of each rollout, shape (n_rollouts,), the same in every trial.
             theta: For each of these trials the policies, shape (n_rollouts, dim).
             states: For each of these trials the learner's state after `ask`; made only if it is read.
+        """
+        ...
+
+    def fly_instead(
+        self, episode: int, trial: npt.NDArray[np.int64], idx: npt.NDArray[np.int64], theta: npt.NDArray[np.float64]
+    ) -> None:
+        """Keep that an operator had other policies flown than those that were planned.
+
+        Args:
+            episode: Number of the episode.
+            trial: Trial of each rollout, shape (n,).
+            idx: Place of each within the episode, shape (n,).
+            theta: Policies as flown, shape (n, dim).
         """
         ...
 

@@ -10,6 +10,7 @@ All that depends on where is flown is the business of a site (`ivl.links.sites`)
 import time
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
@@ -21,6 +22,7 @@ from ivl.errors import LinkError, RolloutError
 from ivl.experiment import Experiment
 from ivl.links import preflight
 from ivl.links.connection import check_uri
+from ivl.links.forecast import Forecasts
 from ivl.links.journal import Journal
 from ivl.links.landing_flight import FlyingEnds, Landing, LandingFlight, Rollout
 from ivl.links.options import Options
@@ -30,10 +32,10 @@ from ivl.links.sites import site_for
 from ivl.links.sites.base import Site, Visit, give_back_time
 from ivl.links.tables import Session
 from ivl.links.tracking import Tracking
-from ivl.links.trouble import Cause, Trouble, Vetoed, before_flight, cause_of, of_checks
+from ivl.links.trouble import Cause, Instead, Trouble, Vetoed, before_flight, cause_of, of_checks
 from ivl.links.vehicle import Command, OtherForms, PolicyRefused, Supervisor, Vehicle
 from ivl.mocap.frame import FlightFrame
-from ivl.outcome import Outcomes, valid
+from ivl.outcome import Outcomes, end_code, valid
 from ivl.source import Flown, Plan
 
 _AGAIN_S, _IDLE_S = 0.2, 3.0
@@ -62,6 +64,7 @@ class CrazyflieSource:
         self.uri, self._experiment, self.options = uri, experiment, options or Options()
         self._site_file = self.options.site_of(experiment, uri)
         self.world = experiment.make_world()
+        self._forecasts = Forecasts(self.world, experiment)
         self._vehicle: Vehicle | None = None
         self._site: Site | None = None
         self._tracking: Tracking | None = None
@@ -75,7 +78,9 @@ class CrazyflieSource:
         self.warnings: list[str] = []
         """What a reader of the results has to know."""
         self._journal: Journal | None = None  # its folder may not be there before the first flight that counts
+        self.vehicle = ""
         site = self._begin()
+        self.is_flown = site.is_flown
         try:
             site.prove(lambda rollout: self._fly_until_known(np.zeros(1, dtype=np.intp), rollout).outcomes)
         except BaseException:
@@ -147,6 +152,7 @@ class CrazyflieSource:
         return LandingFlight(vehicle, self._experiment).fly(site, rollout)
 
     def _fly_until_known(self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout) -> Flown:
+        planned = rollout.theta
         for n in count(1):
             try:
                 if self._vehicle is None:
@@ -156,13 +162,17 @@ class CrazyflieSource:
                 self._keep(landing)
                 good = bool(valid(outcome).all())
                 reason = "" if good else f"simulation: {self.world.end_reason(int(outcome['end_reason'][0]))}"
-                return Flown(index, outcome, reason, self._features(landing))
+                flown = None if rollout.theta == planned else np.array([rollout.theta])
+                return Flown(index, outcome, reason, self._features(landing), flown)
+            except Instead as error:
+                self._note(rollout, f"instead: {' '.join(f'{value:g}' for value in error.theta)}")
+                rollout = replace(rollout, theta=error.theta)
             except PolicyRefused as error:
                 return self._without_flight(index, rollout, "refused", f"vehicle: {error}")
             except Vetoed as error:
                 return self._without_flight(index, rollout, "vetoed", str(error))
             except VehicleAway as error:
-                self._meet(rollout, error, n)
+                self._meet(rollout, self._note_trouble(rollout, error), n)
             except (FlyingEnds, OtherForms):
                 raise
             except LinkError as error:
@@ -248,7 +258,9 @@ class CrazyflieSource:
     def _open_site(self, session: Session, again: bool) -> Site:
         if self.options.mocap is not None:
             self._tracking = Tracking(session, self.options.mocap, self._frame())
-        visit = Visit(self._experiment, self.world, self.options, self._site_file, self._tracking, self._warn)
+        visit = Visit(
+            self._experiment, self.world, self.options, self._site_file, self._tracking, self._forecasts, self._warn
+        )
         kind = site_for(session, self.options)
         self._recovery = self._recovery or kind.recovery(session, self.options)
         clock = kind.make_clock(session, visit)
@@ -260,6 +272,7 @@ class CrazyflieSource:
             give_back_time(clock, self.options.say)
             raise
         self._vehicle, self._site = vehicle, site
+        self.vehicle = vehicle.identity()
         self.options.observer.connected(vehicle, self._tracking)
         return site
 
@@ -326,6 +339,5 @@ def _refused() -> Outcomes:
     for name in outcome.dtype.names or ():
         if outcome.dtype[name].kind == "f":
             outcome[name] = np.nan
-    codes = range(int(native.library().outcome_fields["end_reason"].hi) + 1)
-    outcome["end_reason"] = next(code for code in codes if native.library().end_reason(code) == "refused")
+    outcome["end_reason"] = end_code("refused")
     return outcome

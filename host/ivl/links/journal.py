@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ivl import files
+from ivl import files, recordings
 from ivl.forms import Form
 from ivl.links.landing_flight import Landing, Rollout
-
-JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
 
 
 class Journal:
@@ -34,16 +32,15 @@ class Journal:
         if landing is not None:
             battery_V = landing.battery_V if np.isfinite(landing.battery_V) else None
             line |= {"battery_V": battery_V, "n_legs": int(landing.outcome["n_legs"][0])}
-        with (self._folder / JOURNAL).open("a", encoding="utf-8") as file:
+        with (self._folder / recordings.JOURNAL).open("a", encoding="utf-8") as file:
             file.write(json.dumps(line, allow_nan=False) + "\n")
             file.flush()
             os.fsync(file.fileno())
 
     def keep_recording(self, landing: Landing) -> None:
-        """A file named by seed and stream, if there is a recording."""
+        """A file named after its rollout, if there is a recording."""
         if landing.recording is None:
             return
-        folder = self._folder / RECORDINGS
-        folder.mkdir(exist_ok=True)
-        name = f"{landing.rollout.seed:016x}-{landing.rollout.stream}.csv"
-        files.write(folder / name, landing.recording.to_csv())
+        path = recordings.path_of(self._folder, landing.rollout.seed, landing.rollout.stream)
+        path.parent.mkdir(exist_ok=True)
+        files.write(path, landing.recording.to_csv())

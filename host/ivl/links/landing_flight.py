@@ -184,7 +184,12 @@ def make_safe(vehicle: Vehicle, emergency_W_m: tuple[float, float] | None = None
         if vehicle.phase in (Phase.READY, Phase.APPROACH, Phase.LEVEL_OUT):
             vehicle.ask_for(Command(Request.ABORT), (Phase.ABORTED,), _IDLE_S)
         if vehicle.phase == Phase.ABORTED:
-            vehicle.wait(lambda: vehicle.rule in ("landed", "lost"), 60.0, "landing after an abort")
+            # a new connection asks for IDLE, which one that has landed obeys
+            vehicle.wait(
+                lambda: vehicle.rule in ("landed", "lost") or vehicle.phase == Phase.IDLE,
+                60.0,
+                "landing after an abort",
+            )
             done.append("landed")
         elif vehicle.phase == Phase.IDLE and vehicle.is_flying():
             vehicle.command = Command(Request.IDLE)

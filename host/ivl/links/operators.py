@@ -6,7 +6,7 @@ Nobody is asked who does not sit at a terminal: a drone is never armed from a pi
 
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -15,8 +15,9 @@ from rich.console import Console
 
 from ivl.errors import ConfigError
 from ivl.forms import Form
+from ivl.links.forecast import Forecast
 from ivl.links.landing_flight import FlyingEnds
-from ivl.links.trouble import Cause, Vetoed, state_of
+from ivl.links.trouble import Cause, Instead, Vetoed, state_of
 from ivl.links.truth import Resting
 
 STOP = "stop"
@@ -29,22 +30,6 @@ class OperatorStopped(FlyingEnds):
 
 
 @dataclass(frozen=True)
-class Forecast:
-    """What the simulator expects of a policy, from `n` landings with random numbers of its own."""
-
-    n: int
-    n_landed: int
-    n_strikes: int
-
-    def __str__(self) -> str:
-        """In one line; a strike does not land, and its body or rotors touch the ceiling."""
-        return (
-            f"simulated: {self.n_landed} of {self.n} land; risk: {self.n_strikes} of {self.n} strike the ceiling "
-            "with body or rotors"
-        )
-
-
-@dataclass(frozen=True)
 class Upcoming:
     """The flight that is announced.
 
@@ -53,6 +38,7 @@ class Upcoming:
         n_all: Rollouts that the budget pays for.
         form: Form of the policy.
         theta: Its parameters, in the units of the form.
+        bounds: Those of the search, (lower, upper) of each parameter.
         forecast: What the simulator expects.
         start_W_m: Where the vehicle will hover.
         home_W_m: Where it must stand, along the floor.
@@ -62,6 +48,7 @@ class Upcoming:
     n_all: int
     form: Form
     theta: tuple[float, ...]
+    bounds: Sequence[Sequence[float]]
     forecast: Forecast
     start_W_m: tuple[float, float, float]
     home_W_m: tuple[float, float]
@@ -90,6 +77,7 @@ class Operator(Protocol):
 
         Raises:
             Vetoed: It may not; the next policy is announced.
+            Instead: Another policy is to be flown in its place.
         """
         ...
 
@@ -141,6 +129,14 @@ def answers_of(path: Path) -> Callable[[], str]:
     return read
 
 
+def _numbers(words: list[str]) -> tuple[float, ...]:
+    """The words as numbers; none if one of them is no number."""
+    try:
+        return tuple(float(word) for word in words)
+    except ValueError:
+        return ()
+
+
 def drop_typed() -> None:
     """Forget what was typed ahead of a question."""
     import termios  # the package loads where there is none
@@ -180,6 +176,24 @@ class ConsoleOperator:
                 return answer
             self._tell(f"not understood: {answer!r}; type one of the words in brackets")
 
+    def _ask_policy(self, upcoming: Upcoming) -> tuple[float, ...]:
+        """Ask for the parameters of a policy until each is a number within the bounds of the search."""
+        params = upcoming.form.params
+        named = ", ".join(
+            f"{p.symbol} {lo:g} .. {hi:g} {p.unit}" for p, (lo, hi) in zip(params, upcoming.bounds, strict=True)
+        )
+        while True:
+            self._console.print(f"fly instead: {len(params)} numbers: {named} [numbers | {STOP}]: ", end="")
+            words = self._read().split()
+            if words == [STOP]:
+                raise OperatorStopped(f"stopped by the operator ({_RESUME})")
+            theta = _numbers(words)
+            if len(theta) == len(params) and all(
+                lo <= value <= hi for value, (lo, hi) in zip(theta, upcoming.bounds, strict=True)
+            ):
+                return theta
+            self._tell(f"not understood: {' '.join(words)!r}; type {len(params)} numbers in these bounds")
+
     def place(self, upcoming: Upcoming) -> None:
         """Show the flight, ask, then count down."""
         theta = upcoming.form.describe(upcoming.theta)
@@ -188,9 +202,11 @@ class ConsoleOperator:
             "Vehicle upright at home ({:.2f}, {:.2f}) m; ".format(*upcoming.home_W_m)
             + "it will hover at ({:.2f}, {:.2f}, {:.2f}) m. Everybody outside, net closed.".format(*upcoming.start_W_m)
         )
-        word = f"fly {upcoming.number}"
-        if self._ask("arm and fly?", [word, "veto"]) == "veto":
+        answer = self._ask("arm and fly?", [f"fly {upcoming.number}", "veto", "instead"])
+        if answer == "veto":
             raise Vetoed("vetoed by the operator")
+        if answer == "instead":
+            raise Instead(self._ask_policy(upcoming))
         for left_s in range(self._countdown_s, 0, -1):
             self._tell(f"\atake-off in {left_s} (any key stops)")
             time.sleep(1.0)

@@ -14,6 +14,8 @@ from ivl.site.file import SiteFile
 
 if TYPE_CHECKING:
     from ivl.links.operators import Operator
+    from ivl.rehearsal.day import Day
+    from ivl.rehearsal.script import Script
 
 
 def silent(text: str) -> None:
@@ -35,6 +37,10 @@ class Options:
         keep_recordings: Download the flight recorder of a software vehicle too (of a drone always), and tell learners
             what it says.
         say: Called with each line for people.
+        script: What goes wrong on a rehearsed day with a software vehicle of its own; None: nothing, and its battery
+            stays full.
+        answered_by_script: Nobody is asked in such a rehearsal: the script says yes, and sees what came of a landing.
+        day: The day that follows from the script; whoever starts the vehicle makes it.
         deadlines: Limits of the link.
         observer: Who looks on.
     """
@@ -47,6 +53,9 @@ class Options:
     start_hint: str = "ivl sil --experiment FILE"
     keep_recordings: bool = False
     say: Callable[[str], None] = silent
+    script: "Script | None" = None
+    answered_by_script: bool = False
+    day: "Day | None" = None
     deadlines: Deadlines = DEADLINES
     observer: Observer = NOBODY
 

@@ -108,6 +108,8 @@ class Chips:
 class PilSource:
     """The simulator with the flight core on emulated chips; a whole plan in one batch."""
 
+    is_flown, vehicle = False, ""
+
     def __init__(self, uri: str, experiment: Experiment, threads: int | None = None, record: bool = False) -> None:
         """Fly the experiment's approach; `uri` is pil:// or pil:///path/of/image.elf.
 

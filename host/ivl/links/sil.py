@@ -3,7 +3,6 @@
 The parameters are in group `sil`; a vehicle without it is flown as a drone is.
 """
 
-import math
 import struct
 import zlib
 from dataclasses import dataclass
@@ -22,9 +21,10 @@ MEMORY_OUTCOME, MEMORY_WORLD = 0x1E, 0x1F
 _MAGIC = 0x4F4C5649
 _HEADER = "<5L"
 _AS_FLOWN = 255
+PLACE_AT_START = 2
+"""Value of `sil.place` that puts the vehicle on the floor at its start point."""
 _RESET_S, _SEEN_S, _ENDED_S = 2.0, 0.06, 70.0
-_LAND_S, _LANDED_S = 3.0, 15.0
-_CARRY_MPS, _THERE_M = 0.5, 0.05
+_LANDED_S = 15.0
 
 
 @dataclass(frozen=True)
@@ -48,10 +48,6 @@ class Sil:
             LinkError: It has no outcome memory.
         """
         self._vehicle, self._session = vehicle, vehicle.session
-        number = self._session.memory(MEMORY_OUTCOME)
-        if number is None:
-            raise LinkError(f"{self._session.uri}: the software vehicle has no outcome memory (0x1E)")
-        self._memory = number
         self._draws = b""
         self._block = LogBlock(("sil.ended",), 20)
         self._session.start_log(self._block)
@@ -85,22 +81,42 @@ class Sil:
             LinkError: The outcome is of another landing or policy.
         """
         self._vehicle.wait(lambda: bool(self._block.values.get("sil.ended")), _ENDED_S, "end of the landing")
-        dtype, size = native.library().outcome_dtype, struct.calcsize(_HEADER)
-        data = self._session.read_memory(self._memory, 0, size + dtype.itemsize, "outcome")
-        magic, n_landing, found_size, seq, crc = struct.unpack(_HEADER, data[:size])
-        if (magic, found_size, seq) != (_MAGIC, dtype.itemsize, policy_seq):
-            raise LinkError(
-                f"outcome: landing {n_landing} of policy {seq} with {found_size} bytes (expected one of policy "
-                f"{policy_seq}, {dtype.itemsize} bytes)"
-            )
-        if crc != zlib.crc32(self._draws + data[size:]):
-            raise LinkError(f"outcome: landing {n_landing}: its check sum is that of other random numbers, or bytes")
-        return np.frombuffer(data[size:], dtype=dtype).copy()
+        return last_outcome(self._session, policy_seq, self._draws)
 
     def close(self) -> None:
         """Let the next approach begin where the vehicle hovers."""
         if not self._session.cf.lost:
             self._session.write({"sil.start": _AS_FLOWN})
+
+
+def last_outcome(session: Session, policy_seq: int, draws: bytes | None = None) -> np.ndarray[Any, np.dtype[np.void]]:
+    """The outcome of the last landing that a software vehicle has brought to an end, shape (1,).
+
+    Args:
+        session: Of a software vehicle.
+        policy_seq: Number of the policy that the landing flew.
+        draws: Seed and stream of the landing as they were sent; None: those that the vehicle has.
+
+    Raises:
+        LinkError: It has none, or that of another landing or policy.
+    """
+    number = session.memory(MEMORY_OUTCOME)
+    if number is None:
+        raise LinkError(f"{session.uri}: the software vehicle has no outcome memory (0x1E)")
+    dtype, size = native.library().outcome_dtype, struct.calcsize(_HEADER)
+    data = session.read_memory(number, 0, size + dtype.itemsize, "outcome")
+    magic, n_landing, found_size, seq, crc = struct.unpack(_HEADER, data[:size])
+    if (magic, found_size, seq) != (_MAGIC, dtype.itemsize, policy_seq):
+        raise LinkError(
+            f"outcome: landing {n_landing} of policy {seq} with {found_size} bytes (expected one of policy "
+            f"{policy_seq}, {dtype.itemsize} bytes)"
+        )
+    if draws is None:
+        numbers = session.read(("sil.seed_lo", "sil.seed_hi", "sil.stream_lo", "sil.stream_hi")).values()
+        draws = struct.pack("<4L", *map(int, numbers))
+    if crc != zlib.crc32(draws + data[size:]):
+        raise LinkError(f"outcome: landing {n_landing}: its check sum is that of other random numbers, or bytes")
+    return np.frombuffer(data[size:], dtype=dtype).copy()
 
 
 def reset(vehicle: Vehicle) -> None:
@@ -138,14 +154,15 @@ def put_on_floor(vehicle: Vehicle, place_W_m: tuple[float, float] | None = None)
         vehicle: A software vehicle.
         place_W_m: Where on the floor, m; None: below the point to which a reset puts it.
     """
-    reset(vehicle)
-    if place_W_m is not None and math.dist(vehicle.position_W_m[:2], place_W_m) > _THERE_M:
-        duration_s = math.dist(vehicle.position_W_m[:2], place_W_m) / _CARRY_MPS + 1.0
-        vehicle.go_to((*place_W_m, vehicle.position_W_m[2]), duration_s)
-        vehicle.pause(duration_s + _LAND_S)
-    vehicle.land(0.0, _LAND_S)
-    vehicle.pause(_LAND_S)  # just after a reset its supervisor may not know yet that it flies
+    reset(vehicle)  # a crash and a lock are forgotten
+    session = vehicle.session
+    x_m, y_m = session.read(("sil.start_x", "sil.start_y")).values()
+    to_m = (x_m, y_m) if place_W_m is None else place_W_m
+    session.write({"sil.start_x": to_m[0], "sil.start_y": to_m[1]})
+    session.write({"sil.place": PLACE_AT_START})
+    session.write({"sil.start_x": x_m, "sil.start_y": y_m})
     vehicle.wait(lambda: not vehicle.is_flying(), _LANDED_S, "landing", 0.2)
+    vehicle.pause(_SEEN_S)
 
 
 def is_sil(session: Session) -> bool:

@@ -1,7 +1,7 @@
 """Motion capture of one connection: poses to the vehicle, an abort when they stop in time, the resting pose."""
 
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, Protocol
 
 from ivl.check import Check
 from ivl.links.tables import Session
@@ -12,6 +12,23 @@ from ivl.mocap.frame import FlightFrame
 from ivl.mocap.guard import LossGuard
 from ivl.mocap.simulated import SimulatedRoom
 from ivl.mocap.stream import Mocap
+
+
+class Tracked(Protocol):
+    """What is asked of a tracking system while a vehicle is flown."""
+
+    def problems(self) -> list[str]:
+        """What speaks against a flight now, one line each."""
+        ...
+
+    def resting(self) -> Resting | None:
+        """Where the cameras see the vehicle; None if they do not."""
+        ...
+
+
+def check_of(problem: str) -> Check:
+    """A check that has failed."""
+    return Check("motion capture", False, problem, "good, fast and steady enough", "see ivl mocap")
 
 
 class Tracking:
@@ -51,8 +68,7 @@ class Tracking:
 
     def checks(self) -> list[Check]:
         """One check for each thing that speaks against a flight now."""
-        needed = "good, fast and steady enough"
-        return [Check("motion capture", False, text, needed, "see ivl mocap") for text in self.problems()]
+        return [check_of(text) for text in self.problems()]
 
     def resting(self) -> Resting | None:
         """Where the cameras see the vehicle; None if they do not."""

@@ -78,7 +78,7 @@ STATES = (
     ),
     State(
         Cause.LINK,
-        "silence, or an abort by a rule of link or host",
+        "silence, an abort by a rule of link or host, or a vehicle that has started anew",
         "",
         "the vehicle answers again, which is tried for a minute",
     ),
@@ -120,6 +120,7 @@ _RULES = {
     "setpoint": Cause.LINK,
     "host": Cause.LINK,
     "supervisor": Cause.CRASHED,
+    "config": Cause.LINK,  # it has started anew, and knows nothing of its host
 }
 _CHECKS = {  # a bad link, like all others, is unfit: the operator has to do something
     "battery": Cause.BATTERY,
@@ -136,6 +137,15 @@ class Trouble(RolloutError):
         """`text` is for people: what happened, and what is allowed."""
         super().__init__(text)
         self.cause = cause
+
+
+class Instead(RolloutError):
+    """The operator wants another policy to be flown in this one's place; it is announced next."""
+
+    def __init__(self, theta: tuple[float, ...]) -> None:
+        """`theta` is of the same form, in its units."""
+        super().__init__("another policy instead, by the operator")
+        self.theta = theta
 
 
 class Vetoed(RolloutError):

@@ -11,6 +11,7 @@ from ivl import native
 from ivl.belief.recording import pitch_deg
 from ivl.links.packets import Phase, Recording
 from ivl.links.vehicle import Snapshot
+from ivl.outcome import end_code
 from ivl.world import World, rotation
 
 _TILT_DEG_MAX, _GAP_M_MAX = 25.0, 0.02
@@ -65,7 +66,7 @@ def outcome_of_flight(
     outcome["n_ticks"] = len(rows)
     outcome["t_end_s"] = rows["t_s"][-1] if len(rows) else 0.0
     impact = _impact_row(recording, world)
-    outcome["end_reason"] = _end_code("contact_time" if impact is not None or n_legs else "missed")
+    outcome["end_reason"] = end_code("contact_time" if impact is not None or n_legs else "missed")
     if recording.trigger_row is not None:
         _fill(outcome, rows, recording.trigger_row, "trigger")
         outcome["triggered"] = 1
@@ -91,7 +92,7 @@ def note_no_go(outcome: np.ndarray[Any, np.dtype[np.void]], nearest_m: float, ab
     """
     outcome["no_go"] = 1
     if not aborted:
-        outcome["end_reason"] = _end_code("no_go")
+        outcome["end_reason"] = end_code("no_go")
     outcome["d_min_m"] = np.fmin(outcome["d_min_m"], nearest_m)
 
 
@@ -110,8 +111,3 @@ def _fill(outcome: np.ndarray[Any, Any], rows: np.ndarray[Any, Any], row: int, w
     outcome[f"t_{when}_s"] = rows["t_s"][row]
     outcome[f"vx_{when}_mps"], outcome[f"vz_{when}_mps"] = rows["v_W_mps"][row, 0], rows["v_W_mps"][row, 2]
     outcome[f"rate_{when}_radps"] = -rows["w_B_radps"][row, 1]
-
-
-def _end_code(name: str) -> int:
-    library = native.library()
-    return next(i for i in range(int(library.outcome_fields["end_reason"].hi) + 1) if library.end_reason(i) == name)

@@ -33,7 +33,7 @@ from ivl.links.packets import (
     encode_reading,
 )
 from ivl.links.tables import LogBlock, Session
-from ivl.links.trouble import Cause, Trouble
+from ivl.links.trouble import Cause, Trouble, of_rule
 from ivl.world import World
 
 UNHEARD_S_MAX = 0.4
@@ -46,6 +46,7 @@ _LOGS_S = 3.0
 _REMEDY = {"ivl.motor_thrust_max": " of the motors that its image was made for (choose them: `make -C firmware`)"}
 _ABORT_S, _DOWN_S, _STOP_LAND_S = 3.0, 60.0, 4.0
 _FLYING = (Request.HOVER, Request.APPROACH)
+_FLIPPED = (Phase.FLIP, Phase.COAST, Phase.ATTACHED)
 _EMERGENCY_STOP = b"\x03"
 _ON_ITS_WAY = (Status.INCOMPLETE, Status.CRC)
 """What an echo says while the parts of a policy have not all come."""
@@ -160,6 +161,7 @@ class Vehicle:
         """Whether this flight has left the floor, or was put into the air."""
         self.spoiled_by = ""
         """Why this flight must not be scored, however it ends; empty if there is no reason."""
+        self._has_flipped = False
         self._seq = secrets.randbits(16)
         self._policy_seq = secrets.randbits(31)
         self._offer: Offer | None = None
@@ -189,6 +191,8 @@ class Vehicle:
         if packet is None or (packet.type == PacketType.COMMAND_ECHO and self._is_late(packet)):
             return
         self._echo[packet.type] = packet
+        if packet.type == PacketType.COMMAND_ECHO and packet["phase"] in _FLIPPED:
+            self._has_flipped = True
         if packet.type == PacketType.COMMAND_ECHO and packet["phase"] == Phase.ABORTED and not self.aborted_by:
             self.aborted_by = native.library().rule_name(int(packet["cause"]))
 
@@ -217,16 +221,23 @@ class Vehicle:
         """Let time pass until a condition holds, which is looked at every `step_s`, or else with each heartbeat.
 
         Raises:
-            RolloutError: It did not within `limit_s` of vehicle time.
+            Trouble: It did not within `limit_s` of vehicle time; its cause is that of the rule that holds.
             LinkError: The vehicle fell silent.
         """
         end_s = self.clock.now_s() + limit_s
         while not condition():
             if self.clock.now_s() >= end_s:
-                raise RolloutError(f"{what}: not within {limit_s:g} s ({self.describe()})")
+                raise Trouble(of_rule(self.rule), f"{what}: not within {limit_s:g} s ({self.describe()})")
             self.pause(step_s or self.clock.pace.beat_s)
             if self.session.silence_s > self.session.deadlines.answer_s:
                 raise LinkError(f"{self.session.uri}: nothing was heard for {self.session.silence_s:.1f} s")
+
+    def pause_until(self, condition: Callable[[], bool], limit_s: float, step_s: float) -> bool:
+        """Let time pass until a condition holds; returns whether it does within `limit_s` of vehicle time."""
+        end_s = self.clock.now_s() + limit_s
+        while not (found := condition()) and self.clock.now_s() < end_s:
+            self.pause(step_s)
+        return found
 
     def wait_in_wall_time(self, condition: Callable[[], bool], limit_s: float) -> bool:
         """Let time pass until a condition holds; returns whether it does after `limit_s` at the latest."""
@@ -267,7 +278,7 @@ class Vehicle:
         """
         self.check_stop()
         self.abort_reason = self.aborted_by = self.spoiled_by = ""
-        self.abort_cause, self.has_begun = Cause.TRACKING, False
+        self.abort_cause, self.has_begun, self._has_flipped = Cause.TRACKING, False, False
         self._n_no_go = int(self._decision.values.get("ivl.n_no_go", 0))
         self._offer = None
 
@@ -297,8 +308,12 @@ class Vehicle:
         return False
 
     def spoil(self, reason: str) -> None:
-        """This flight must not be scored; the first reason is kept. From any thread."""
-        self.spoiled_by = self.spoiled_by or reason
+        """This flight must not be scored, unless its flip has begun; the first reason is kept. From any thread.
+
+        After the flip nothing flies by the cameras any more, and a vehicle that falls may well be lost by them.
+        """
+        if not self._has_flipped:
+            self.spoiled_by = self.spoiled_by or reason
 
     def come_down(self) -> None:
         """Land where it hovers after a flight that is over: its landing is that of an abort, but it is none.
@@ -488,7 +503,7 @@ class Vehicle:
 
     def take_off(self, height_m: float, duration_s: float) -> None:
         """Climb to a height, by the high-level commander; returns when the vehicle has taken the order."""
-        self.has_begun = True
+        self.has_begun, self._has_flipped = True, False
         self._high_level(struct.pack("<BBff?f", 7, 0, height_m, 0.0, True, duration_s), "take-off")
 
     def go_to(self, position_W_m: tuple[float, float, float], duration_s: float) -> None:
@@ -513,6 +528,13 @@ class Vehicle:
             raise RolloutError(f"{what}: the vehicle refused it (error {error}; {self.supervisor()!r})")
 
     # ---- what it tells
+
+    def identity(self) -> str:
+        """Which vehicle it is: the number of its processor; empty if it does not tell."""
+        names = ("cpu.id0", "cpu.id1", "cpu.id2")
+        if not all(self.session.has_param(name) for name in names):
+            return ""
+        return "".join(f"{int(value):08x}" for value in self.session.read(names).values())
 
     @property
     def battery_V(self) -> float:

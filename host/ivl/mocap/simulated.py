@@ -53,6 +53,18 @@ class Link(Protocol):
         ...
 
 
+class Viewer(Protocol):
+    """Whoever gets the frames: a server of a tracking system, or a program that looks itself."""
+
+    def send(self, frame: dict[str, list[float] | None]) -> None:
+        """Take a frame: the pose of each body, None if it is not seen."""
+        ...
+
+    def close(self) -> None:
+        """No frame comes any more."""
+        ...
+
+
 class SimulatedRoom:
     """Cameras around software vehicles. Faults are attributes that can be set at any time."""
 
@@ -81,7 +93,10 @@ class SimulatedRoom:
         self._noise_m, self._rng = noise_m, np.random.default_rng(seed)
         self._lock = threading.Lock()
         self._closed = False
-        self._servers: list[NatNetServer] = []
+        self.time_s = 0.0
+        """Time of the first vehicle at its last row, from an arbitrary zero."""
+        self._time_ms: int | None = None
+        self._viewers: list[Viewer] = []
         self._frame: dict[str, list[float] | None] = {}
         self._last: dict[str, list[float]] = {}
         self.track(link, body)
@@ -109,15 +124,20 @@ class SimulatedRoom:
         """What the process of a `Mocap` is told, to connect to these cameras; one call for each."""
         server = NatNetServer(tuple(self._frame))
         with self._lock:
-            self._servers.append(server)
+            self._viewers.append(server)
         return {"system": "optitrack", "options": server.options, "connect_s": config.connect_s}
+
+    def show(self, viewer: Viewer) -> None:
+        """Let somebody in this process see each frame, in the link's thread."""
+        with self._lock:
+            self._viewers.append(viewer)
 
     def close(self) -> None:
         """Switch the cameras off."""
         with self._lock:
             self._closed = True
-        for server in self._servers:
-            server.close()
+        for viewer in self._viewers:
+            viewer.close()
 
     def __enter__(self) -> Self:
         """The room itself."""
@@ -142,11 +162,19 @@ class SimulatedRoom:
         with self._lock:
             if self._closed:
                 return
+            if body == next(iter(self._frame)):
+                self._note_time(int.from_bytes(data[1:4], "little"))
             if self._frame[body] is not None:  # it is here again before another has come once
                 self._send()
             self._frame[body] = self._see(body, _LAYOUT.unpack(data[_HEAD:]))
             if all(pose is not None for pose in self._frame.values()):
                 self._send()
+
+    def _note_time(self, now_ms: int) -> None:
+        """The stamp of a log packet has 24 bits, and wraps."""
+        before_ms = now_ms if self._time_ms is None else self._time_ms
+        self.time_s += ((now_ms - before_ms) & 0xFF_FFFF) * 1e-3
+        self._time_ms = now_ms
 
     def _see(self, body: str, truth: tuple[float, ...]) -> list[float]:
         """What the cameras make of a body's pose."""
@@ -166,5 +194,5 @@ class SimulatedRoom:
         if self.swapped is not None:
             a, b = self.swapped
             frame[a], frame[b] = frame[b], frame[a]
-        for server in self._servers:
-            server.send(frame)
+        for viewer in self._viewers:
+            viewer.send(frame)

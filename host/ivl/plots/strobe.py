@@ -17,6 +17,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from ivl.flown import landings
 from ivl.learning.recorder import SCORED
 from ivl.outcome import four_leg, verdict
 from ivl.plots import style
@@ -34,7 +35,12 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def draw_last_landing(result: RunResult) -> list[Path]:
-    """Fly the last four-leg landing of a run (or its last rollout) again and draw it into the run's folder."""
+    """Fly the last four-leg landing of a run (or its last rollout) again and draw it into the run's folder.
+
+    Of a run that a vehicle has flown the recording is drawn, and beside it the simulated counterpart.
+    """
+    if "flown" in result.summary:
+        return _draw_last_flown(result)
     scored = np.flatnonzero(result.rollouts.status == SCORED)
     landed = scored[four_leg(result.rollouts.outcomes[scored])]
     row = int(landed[-1] if landed.size else scored[-1])
@@ -52,14 +58,33 @@ def draw_last_landing(result: RunResult) -> list[Path]:
     return draw(result.world, trace, [result.folder / f"last_landing{suffix}" for suffix in (".png", ".svg")])
 
 
+def _draw_last_flown(result: RunResult) -> list[Path]:
+    """The last recording of a landing on three or four legs, or the last one at all; none, if no flip was recorded."""
+    found = landings(result.folder, result.experiment, result.world, result.rollouts)
+    flips = [(each, each.recorded) for each in found if each.recorded is not None]
+    landed = [(each, trace) for each, trace in flips if four_leg(result.rollouts.outcomes[[each.row]])[0]]
+    if not flips:
+        return []
+    each, recorded = (landed or flips)[-1]
+    drawn = []
+    for name, trace, told in (
+        ("last_landing", recorded, "RECORDED (legs as in flight)"),
+        ("last_landing_simulated", each.simulated, "SIMULATED counterpart"),
+    ):
+        paths = [result.folder / f"{name}{suffix}" for suffix in (".png", ".svg")]
+        drawn += draw(result.world, trace, paths, f"rollout {each.number}, {told}")
+    return drawn
+
+
 @style.drawing
-def draw(world: World, trace: Trace, paths: Sequence[Path]) -> list[Path]:
+def draw(world: World, trace: Trace, paths: Sequence[Path], what: str = "") -> list[Path]:
     """Draw one landing; trigger and touch-down in colours of their own, the ghosts coloured by time.
 
     Args:
         world: Gives the shapes.
         trace: The landing.
         paths: Files to write.
+        what: What it is, before the title; empty: a simulated one.
     """
     figure = style.new_figure(7.5, 5.0)
     left, right = figure.subplots(1, 2)
@@ -70,7 +95,7 @@ def draw(world: World, trace: Trace, paths: Sequence[Path]) -> list[Path]:
     _draw_panel(figure, left, world, trace, first_s, touch_s, titles[0])
     _draw_panel(figure, right, world, trace, touch_s, last_s, titles[1])
     left.set_ylabel(_labels(world)[1])
-    figure.suptitle(_title(world, trace), fontsize=style.NORMAL)
+    figure.suptitle(f"{what}: {_title(world, trace)}" if what else _title(world, trace), fontsize=style.NORMAL)
     events = _events(world, trace)
     for label, time_s, color in events:
         left.plot([], [], color=color, linewidth=2.2, label=f"{label}, t = {time_s:.3f} s")

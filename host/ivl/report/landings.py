@@ -8,7 +8,7 @@ from ivl import shapes
 from ivl.landing import LandingSpec
 from ivl.report import replay
 from ivl.rewards import RewardChoice
-from ivl.world import World
+from ivl.world import Trace, World
 
 Key = tuple[Any, ...]
 
@@ -43,6 +43,12 @@ class Album:
         _, trace = spec.fly(world)
         self.n_different += not as_recorded(trace.outcome)
         packed = replay.pack(spec, world, trace, self.reward)
+        self.landings.append({"label": label, "geometry": self._names[_key(spec)], **packed})
+        return len(self.landings) - 1
+
+    def show(self, spec: LandingSpec, trace: Trace, label: str) -> int:
+        """Take a landing as it is, recorded or simulated, and return its number; `label` says which it is."""
+        packed = replay.pack(spec, self._world(spec), trace, self.reward)
         self.landings.append({"label": label, "geometry": self._names[_key(spec)], **packed})
         return len(self.landings) - 1
 

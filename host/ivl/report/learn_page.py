@@ -17,6 +17,7 @@ from ivl.learning.recorder import SCORED, EpisodeRow, RolloutRows
 from ivl.outcome import four_leg
 from ivl.plots.convergence import outcome_classes
 from ivl.report import replay
+from ivl.report.flown_part import FlownPart
 from ivl.report.landings import Album, thinned
 from ivl.report.page import axis_from_zero, encode, fine_unit, flatten, learner_words, parameter_names, reward_names
 from ivl.store import RunStore, read_manifest
@@ -36,19 +37,28 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
     experiment, n_trials = run.read_config(folder)
     with RunStore.open_reading(folder, native.library().outcome_dtype) as store:
         history, rollouts = store.episodes(), store.rollouts(trial=0)
+        corrections = store.amendments()
     album, numbers = Album(experiment.reward), np.full(len(rollouts), -1)
     scored = np.flatnonzero(rollouts.status == SCORED)
     if not scored.size:
         raise StoreError(f"{folder}: no rollout is finished, there is nothing to report")
-    notable = _notable(rollouts, scored)
-    chosen = thinned(scored.tolist(), n_landings_max) | {row for _, row in notable}
-    for done, row in enumerate(sorted(chosen), 1):
-        numbers[row] = album.add(_spec(experiment, rollouts, row), f"rollout {row}", _is_recorded(rollouts, row))
-        on_landing(done, len(chosen))
+    notable, flown = _notable(rollouts, scored), None
+    if read_manifest(folder).get("flown"):
+        flown = FlownPart.of(folder, experiment, rollouts, album, on_landing)
+        numbers = flown.numbers
+        notable = [(what, row) for what, row in notable if numbers[row] >= 0]
+    else:
+        chosen = thinned(scored.tolist(), n_landings_max) | {row for _, row in notable}
+        for done, row in enumerate(sorted(chosen), 1):
+            numbers[row] = album.add(_spec(experiment, rollouts, row), f"rollout {row}", _is_recorded(rollouts, row))
+            on_landing(done, len(chosen))
     data = {
         "title": f"Inverted landing: {experiment.name}",
         "subtitle": experiment.doc,
-        "facts": [*_facts(experiment, n_trials or 1, folder), album.fact()],
+        "facts": [
+            *_facts(experiment, n_trials or 1, folder, flown is not None),
+            *([album.fact()] if flown is None else flown.facts),
+        ],
         "manifest": flatten(read_manifest(folder)),
         "claims": None,
         "scale": replay.SCALE,
@@ -63,6 +73,7 @@ def collect(folder: Path, n_landings_max: int, on_landing: Callable[[int, int], 
             "notable": [{"what": what, "landing": int(numbers[row])} for what, row in notable],
             "first_shown": [0, max(0, len(notable) - 2)],
             "pictures": _pictures(experiment, [row for row in history if row.trial == 0], rollouts),
+            "flown": None if flown is None else flown.data(corrections),
         },
     }
     return data, album
@@ -100,7 +111,7 @@ def _notable(rollouts: RolloutRows, scored: Any) -> list[tuple[str, int]]:
     return [*found, ("worst return", int(scored[np.argmin(reward)]))]
 
 
-def _facts(experiment: Experiment, n_trials: int, folder: Path) -> list[list[str]]:
+def _facts(experiment: Experiment, n_trials: int, folder: Path, is_flown: bool) -> list[list[str]]:
     facts = [
         ["Vehicle and gear", f"{experiment.vehicle}, {experiment.gear_set}/{experiment.gear}"],
         ["Approach", f"{experiment.speed_mps:g} m/s at {experiment.angle_deg:g}°"],
@@ -108,7 +119,8 @@ def _facts(experiment: Experiment, n_trials: int, folder: Path) -> list[list[str
         ["Rollouts", f"{experiment.budget} in episodes of {experiment.n_rollouts}"],
         ["Seed", str(experiment.seed) if n_trials == 1 else f"{experiment.seed} and on, {n_trials} trials"],
     ]
-    return facts + _verdict(folder / "result.json", n_trials, experiment)
+    judged = _verdict(folder / "result.json", n_trials, experiment)
+    return facts + [[f"{name}, by the simulator", text] if is_flown else [name, text] for name, text in judged]
 
 
 def _verdict(path: Path, n_trials: int, experiment: Experiment) -> list[list[str]]:

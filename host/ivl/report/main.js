@@ -71,7 +71,23 @@ function showLearn(data, replay) {
   }));
   $("#convergence-note").textContent = "Rate: share of landings on three or four legs in an episode. Click a dot to replay that rollout in view A.";
   showPictures(learn.pictures);
+  if (learn.flown) showFlown(learn.flown, replay);
+  if (!learn.notable.length) return;
   [1, 0].forEach((pane) => replay.show(pane, learn.notable[learn.first_shown[pane]].landing));
+}
+
+// A run that a vehicle has flown: each recording beside its simulated counterpart, and the recordings to save.
+function showFlown(flown, replay) {
+  $("#flown").hidden = false;
+  table($("#flown-table"), flown.head, flown.rows.map(({ cells, recorded, simulated }) =>
+    [...cells, replayButtons(replay, recorded, `recording of rollout ${cells[0]}`), replayButtons(replay, simulated, `simulated counterpart of rollout ${cells[0]}`)]));
+  const files = $("#flown-files");
+  files.append("Recordings to save: ");
+  Object.entries(flown.recordings).forEach(([name, text]) => {
+    files.append(element("a", name, { download: name, href: `data:text/csv;charset=utf-8,${encodeURIComponent(text)}` }), " ");
+  });
+  if (flown.amendments.length) table($("#amendments-table"), ["corrected", "who", "when", "before", "after", "why"], flown.amendments.map((made) =>
+    [`episode ${made.episode}, ${made.idx}`, made.who, made.utc, JSON.stringify(made.before), JSON.stringify(made.after), made.why]));
 }
 
 // A term of the return as text; its scale is the reward's own.

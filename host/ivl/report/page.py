@@ -37,8 +37,7 @@ def render(data: Mapping[str, Any]) -> str:
     footer = (
         f"Made by ivl {ivl.__version__} from a policy file; flights by its simulator."
         if "policy" in data
-        else f"Made by ivl {ivl.__version__} from the run's own files; landings flown again by its simulator. "
-        "Figures: plotly.js (MIT)."
+        else f"Made by ivl {ivl.__version__} from the run's own files; {_flown_words(data)} Figures: plotly.js (MIT)."
     )
     parts = {
         "style": _read("page.css"),
@@ -54,6 +53,12 @@ def render(data: Mapping[str, Any]) -> str:
         name, text = part.split("}}", 1)
         pieces += [parts[name], text]
     return "".join(pieces)
+
+
+def _flown_words(data: Mapping[str, Any]) -> str:
+    if data.get("learn", {}).get("flown"):
+        return "recordings are the vehicle's, counterparts are simulated."
+    return "landings flown again by its simulator."
 
 
 def encode(values: npt.ArrayLike, unit: float) -> dict[str, Any]:

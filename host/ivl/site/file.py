@@ -18,7 +18,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from ivl import files, references, yamlfile
 from ivl.errors import ConfigError
 from ivl.mocap.config import MocapConfig
-from ivl.settings import Finite, Strict
+from ivl.settings import Finite, Name, Strict
 
 TEMPLATE = Path(__file__).parent / "new.yaml"
 SIMULATED_TRACKING = ("simulator", "mock")
@@ -108,7 +108,7 @@ MEASURED = (
 class SiteFile(Strict):
     """A room as measured, and what was agreed for flying in it."""
 
-    name: str = Field(min_length=1, pattern=r"^[A-Za-z0-9_.-]+$")
+    name: Name
     doc: str = Field(min_length=1)
     surface: SurfacePlace
     fence: Fence

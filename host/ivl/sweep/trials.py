@@ -104,6 +104,8 @@ def run(sweep: Sweep, world: World, trials: Sequence[Trial]) -> Log:
 class Approaches:
     """Source of rollouts in which every trial has its own approach: a whole plan as one native batch on one thread."""
 
+    is_flown, vehicle = False, ""
+
     def __init__(self, sweep: Sweep, world: World, trials: Sequence[Trial]) -> None:
         """Fly the approaches of `trials` in `world`."""
         self.warnings: list[str] = []
@@ -180,6 +182,16 @@ class Columns:
         self._episode, self._trials, self._stream = episode, np.array(trials, dtype=np.int64), stream
         self._status = np.full((len(self._log.trials), self._n), PLANNED, dtype=f"U{len(DISCARDED)}")
         self._log.theta[self._trials, episode] = theta
+
+    def fly_instead(
+        self,
+        episode: int,
+        trial: npt.NDArray[np.int64],
+        idx: npt.NDArray[np.int64],
+        theta: FloatArray,
+    ) -> None:
+        """Keep policies as flown; a sweep has no operator, but records what it is told."""
+        self._log.theta[trial, episode, idx] = theta
 
     def score(
         self,

@@ -1,6 +1,6 @@
 """This project's recordings: the flight recorder's table, and run folders of `ivl learn` that keep them.
 
-A run folder knows policy, approach, outcome and return of each recording from its database, by seed and stream.
+A run folder knows policy, approach, outcome and return of each recording from its database, by its name.
 """
 
 import json
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ivl import forms, native, run
+from ivl import forms, native, recordings, run
 from ivl.errors import ConfigError, IvlError
 from ivl.flight import table as border
 from ivl.flight.log import Format, Given, Log, with_rules
@@ -19,8 +19,6 @@ from ivl.flight.table import Rule
 from ivl.learning.recorder import SCORED, RolloutRows
 from ivl.seeds import Purpose, derive
 from ivl.store import RunStore
-
-JOURNAL, RECORDINGS = "flights.jsonl", "recordings"
 
 
 def _vector(stem: str, axes: str, suffix: str, pattern: str) -> list[Rule]:
@@ -49,9 +47,9 @@ def load(paths: Sequence[Path], given: Given) -> Log:
     notes: list[str] = []
     for path in paths:
         if border.is_folder(path):
-            recordings = _recordings(path)
-            flights += _run(path, recordings, given, notes)
-            files += [path / "run.sqlite", *recordings]
+            found = _recordings(path)
+            flights += _run(path, found, given, notes)
+            files += [path / "run.sqlite", *found]
         else:
             flights.append(_flight(path, {"label": path.stem}, given))
             files.append(path)
@@ -74,15 +72,15 @@ def _flight(path: Path, known: dict[str, Any], given: Given) -> Flight:
 
 
 def _recordings(folder: Path) -> list[Path]:
-    files = sorted((folder / RECORDINGS).glob("*.csv"))
+    files = sorted((folder / recordings.FOLDER).glob("*.csv"))
     if not files:
-        raise ConfigError(f"{folder}: no {RECORDINGS}/*.csv: neither a run folder of a vehicle nor a file")
+        raise ConfigError(f"{folder}: no {recordings.FOLDER}/*.csv: neither a run folder of a vehicle nor a file")
     return files
 
 
 def _run(folder: Path, files: list[Path], given: Given, notes: list[str]) -> list[Flight]:
     known = _database(folder)
-    battery_V = _journal(folder / JOURNAL)
+    battery_V = _journal(folder / recordings.JOURNAL)
     for name, info in known.items():
         if name in battery_V:
             info["note"] = f"battery {battery_V[name]:.2f} V before take-off"
@@ -112,7 +110,7 @@ def _database(folder: Path) -> dict[str, dict[str, Any]]:
             label = f"ep{rows.episode[i]}-run{rows.idx[i]}"
             label = f"trial{trial}-{label}" if n_trials else label
             told = _rollout(experiment.policy.shape, rows, i)
-            result[f"{seed:016x}-{rows.stream[i]}"] = {"label": label, **site, **told}
+            result[recordings.name_of(seed, int(rows.stream[i]))] = {"label": label, **site, **told}
     return result
 
 
@@ -139,7 +137,7 @@ def _journal(path: Path) -> dict[str, float]:
         try:
             entry = json.loads(line)
             if entry["what"] == "flown" and entry["battery_V"] is not None:
-                result[f"{int(entry['seed']):016x}-{int(entry['stream'])}"] = float(entry["battery_V"])
+                result[recordings.name_of(int(entry["seed"]), int(entry["stream"]))] = float(entry["battery_V"])
         except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
             raise ConfigError(f"{path}: line {number}: is no entry of a journal") from error
     return result

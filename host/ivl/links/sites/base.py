@@ -13,6 +13,7 @@ from ivl.check import Check
 from ivl.errors import LinkError
 from ivl.experiment import Experiment
 from ivl.links.clock import Clock
+from ivl.links.forecast import Forecasts
 from ivl.links.landing_flight import Landing, Outcome, Rollout
 from ivl.links.options import Options
 from ivl.links.packets import Recording
@@ -35,6 +36,7 @@ class Visit:
         options: How it is flown.
         site_file: The room as measured; None: a simulator has none.
         tracking: Motion capture that follows the vehicle; None: there is none of ours.
+        forecasts: What the simulator expects of a policy.
         warn: Called with what a reader of the results has to know.
     """
 
@@ -43,6 +45,7 @@ class Visit:
     options: Options
     site_file: SiteFile | None
     tracking: Tracking | None
+    forecasts: Forecasts
     warn: Callable[[str], None]
 
 
@@ -51,12 +54,14 @@ class Site(Protocol):
 
     Attributes:
         contact_is_seen: Whether outcomes there tell when the first leg touched, and not when the accelerometer noticed.
+        is_flown: Whether a vehicle flies there whose flights nobody can repeat bit for bit.
         battery_is_flown: Whether the voltage that the vehicle tells is that of the battery that drives its motors.
 
     Unless a method says otherwise, it may raise LinkError (the link is gone) and RolloutError (not now, and why).
     """
 
     contact_is_seen: bool
+    is_flown: bool
     battery_is_flown: bool
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:

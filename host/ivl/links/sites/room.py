@@ -1,14 +1,12 @@
 """A room with a ceiling, and an operator who places the vehicle and tells what came of a landing."""
 
 import math
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from ivl.check import Check
 from ivl.errors import ConfigError
-from ivl.experiment import Experiment
 from ivl.links import operators, preflight, sil
 from ivl.links.clock import Clock, WallClock
 from ivl.links.landing_flight import (
@@ -20,21 +18,21 @@ from ivl.links.landing_flight import (
     make_safe,
     safe_or_why,
 )
-from ivl.links.operators import ConsoleOperator, Forecast, Upcoming
+from ivl.links.operators import ConsoleOperator, Upcoming
 from ivl.links.options import Options
 from ivl.links.packets import Phase, Recording, Request
 from ivl.links.recovery import AskOperator, Recovery
 from ivl.links.sites.base import Visit, give_back_time
 from ivl.links.stop import Stop
 from ivl.links.tables import Session
+from ivl.links.tracking import Tracked
 from ivl.links.trouble import Cause, Trouble, of_checks
 from ivl.links.truth import Resting, note_no_go, outcome_of_flight, suggest_legs
 from ivl.links.vehicle import Command, Supervisor, Vehicle
-from ivl.outcome import four_leg, verdict
+from ivl.outcome import verdict
 from ivl.site.require import HOW, refuse_unfit
 from ivl.startpoint import Point, start_point
 from ivl.surface import Surface
-from ivl.world import World
 
 CLIMB_MPS, TRAVEL_MPS = 0.5, 0.5
 NEAR_M = 0.1
@@ -43,18 +41,19 @@ HOME_M = 0.3
 """It stands at home when its estimate is as near as this, along the floor and in height."""
 AWAY_S = 120.0
 """An operator who has not answered for so long was away: the vehicle is checked again before it is armed."""
-FORECASTS = 64
-_FORECAST_SEED = 2**63 - 1  # no trial has it: a forecast must not draw the numbers of the landing
 SURE_LEGS = (0, 4)
 """Legs of which a resting pose alone tells: hanging level, or not at the ceiling."""
+_FIT = Supervisor.ARMED | Supervisor.CAN_FLY
 _LOOK_S = 0.02
-_SETTLE_S, _IDLE_S, _ARM_S, _END_S = 1.0, 3.0, 3.0, 30.0
+_TURNED = (Phase.COAST, Phase.ATTACHED, Phase.DONE)
+"""Phases after a flip, which the recorder has: nobody needs to look how near the vehicle came."""
+_SETTLE_S, _IDLE_S, _ARM_S, _END_S = 1.0, 3.0, 8.0, 30.0
 
 
 class Room:
     """A site where nobody knows more than recorder, cameras and operator see."""
 
-    contact_is_seen, battery_is_flown = False, True
+    contact_is_seen, is_flown, battery_is_flown = False, True, True
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """Any vehicle.
@@ -70,7 +69,8 @@ class Room:
         if not sil.is_sil(vehicle.session):
             refuse_guesses(vehicle.session.uri, visit)
         self._vehicle, self._visit = vehicle, visit
-        self._world, self._tracking, self._say = visit.world, visit.tracking, visit.options.say
+        self._world, self._say = visit.world, visit.options.say
+        self._tracking: Tracked | None = visit.tracking
         self._start_W_m = start_point(visit.world, visit.experiment)
         self._stop = Stop(visit.options.folder, self._room.stop == "motors_off", self._say)
         self._operator = visit.options.operator or ConsoleOperator()
@@ -100,8 +100,12 @@ class Room:
         vehicle = self._vehicle
         if again:
             self._say(f"vehicle: {make_safe(vehicle, self._room.emergency_m)}")
-        if Supervisor.CRASHED in vehicle.supervisor():
-            vehicle.recover()  # only upright; whether it is forgotten is a check
+        self._forget_crash()
+
+    def _forget_crash(self) -> None:
+        """Ask for it; only upright, and whether it is forgotten is a check."""
+        if Supervisor.CRASHED in self._vehicle.supervisor():
+            self._vehicle.recover()
 
     def checks(self) -> Iterator[Check]:
         """The whole preflight."""
@@ -133,9 +137,9 @@ class Room:
     def to_start(self, rollout: Rollout) -> Point:
         """Ask the operator, arm, take off, fly to the start point."""
         vehicle = self._vehicle
-        began_s = time.monotonic()
+        began_s = vehicle.clock.now_s()
         self._place(rollout)
-        if time.monotonic() - began_s > AWAY_S:
+        if vehicle.clock.now_s() - began_s > AWAY_S:
             self._check_again()
         self._check_gate()
         self._stop.begin(vehicle)
@@ -163,13 +167,15 @@ class Room:
         experiment = self._visit.experiment
         form = experiment.policy.shape
         return Upcoming(
-            rollout.stream + 1, experiment.budget, form, rollout.theta, forecast(self._world, experiment, rollout),
+            rollout.stream + 1, experiment.budget, form, rollout.theta, experiment.policy.bounds,
+            self._visit.forecasts.of(rollout.theta),
             self._start_W_m, self._room.home_m,
         )  # fmt: skip
 
     def _check_again(self) -> None:
         """The operator was away: battery, link, tracking and supervisor may be other than they were."""
         self._say(f"{Cause.AWAY}: nobody answered for {AWAY_S:g} s, so the vehicle is checked again")
+        self._forget_crash()
         trouble = of_checks(list(self.checks()), Supervisor.LOCKED in self._vehicle.supervisor())
         if trouble is not None:
             raise trouble
@@ -207,7 +213,8 @@ class Room:
             raise Trouble(Cause.CRASHED, "the vehicle counts as crashed: set it upright on the floor")
         if Supervisor.ARMED not in vehicle.supervisor():
             vehicle.arm(True)
-            vehicle.wait(lambda: Supervisor.ARMED in vehicle.supervisor(), _ARM_S, "arming", 0.1)
+        # one that has just landed, or was just armed, refuses a take-off until its supervisor lets it fly
+        vehicle.wait(lambda: _FIT in vehicle.supervisor(), _ARM_S, "arming", 0.1)
 
     def _wait_near(self, target_W_m: Point, duration_s: float) -> None:
         vehicle = self._vehicle
@@ -226,7 +233,13 @@ class Room:
         """Wait until the motors are off for good, read the recorder, and let the operator confirm what is seen."""
         vehicle = self._vehicle
         nearest = Nearest(self._world.surface, self._position_W_m)
-        vehicle.wait(lambda: nearest.look() or self._is_over(), _END_S, "end of the landing", _LOOK_S)
+        vehicle.wait(
+            lambda: nearest.look() or vehicle.phase in _TURNED or self._is_over(),
+            _END_S,
+            "end of the approach",
+            _LOOK_S,
+        )
+        vehicle.wait(self._is_over, _END_S, "end of the landing")
         level_out = None
         if vehicle.phase == Phase.LEVEL_OUT:
             level_out = end_level_out(vehicle, self._world.surface)
@@ -324,16 +337,6 @@ class Nearest:
         if gap_m < self.gap_m:
             self.gap_m = gap_m
         return False
-
-
-def forecast(world: World, experiment: Experiment, rollout: Rollout) -> Forecast:
-    """What the simulator in this process expects of a policy."""
-    out = world.rollouts(
-        experiment.speed_mps, experiment.angle_deg, *rollout.theta, form=experiment.policy.form,
-        seed=_FORECAST_SEED, stream=np.arange(FORECASTS, dtype=np.uint64), start=experiment.start,
-    )  # fmt: skip
-    landed = four_leg(out)
-    return Forecast(FORECASTS, int(landed.sum()), int((~landed & (out["body_contact"] != 0)).sum()))
 
 
 def resting_by_estimate(vehicle: Vehicle, recording: Recording) -> Resting:

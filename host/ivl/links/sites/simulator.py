@@ -29,7 +29,7 @@ class Simulator:
     The voltage that a software vehicle tells is that of its power management, and not of the world's battery.
     """
 
-    contact_is_seen, battery_is_flown = True, False
+    contact_is_seen, is_flown, battery_is_flown = True, False, False
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """The vehicle must be a software vehicle."""
