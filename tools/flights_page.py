@@ -243,7 +243,7 @@ and what no member explains is learned from outcomes near by. They were chosen o
 {_table("| guards | window reaches flown landings after flight | stays from flight | rate expected where flights landed |", _guards(b))}
 
 So none of them is needed for these flights: without any, the window is right from flight {b["guards"]["none of them"]["first"]} on. With all of
-them the belief takes longer, since single outcomes count less.
+them the belief takes longer, since single outcomes count less. It is one run of each, so small differences say nothing.
 
 ![What the belief expects after each real flight](figures/flights_belief.png)"""
 
