@@ -1,7 +1,7 @@
 """`--live`: a view of the run beside it, told by the run's hooks and by what the terminal says."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +13,7 @@ from ivl.cli import console
 from ivl.errors import IvlError
 from ivl.experiment import Experiment
 from ivl.learning.loop import Progress
-from ivl.links.observer import Nobody, Observer
+from ivl.links.observer import NOBODY, Observer
 from ivl.run import Hooks
 
 if TYPE_CHECKING:
@@ -42,14 +42,15 @@ def shown(chosen: Experiment, folder: Path, uri: str | None, live: bool, at: str
     except ModuleNotFoundError as error:
         raise IvlError(f"--live: {error.name} is not installed: pip install 'ivl[live]'") from error
     where = view.address(at or view.DEFAULT_AT)
-    with view.View(chosen, folder, where, not links.is_vehicle(uri), console.say) as opened:
-        with console.overheard(opened.board.hear):
-            yield opened.board
+    with ExitStack() as stack:
+        opened = stack.enter_context(view.View(chosen, folder, where, not links.is_vehicle(uri), console.say))
+        stack.enter_context(console.overheard(opened.board.hear))  # from here on: its address has the token
+        yield opened.board
 
 
 def observer(board: "Board | None") -> Observer:
     """Who looks on while a vehicle flies."""
-    return Nobody() if board is None else board
+    return NOBODY if board is None else board
 
 
 def told(hooks: Hooks, board: "Board | None") -> Hooks:

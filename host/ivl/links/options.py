@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ivl.experiment import Experiment
 from ivl.links.deadlines import DEADLINES, Deadlines
-from ivl.links.observer import Nobody, Observer
+from ivl.links.observer import NOBODY, Observer
 from ivl.mocap.config import MocapConfig
 from ivl.site import require
 from ivl.site.file import SiteFile
@@ -57,7 +57,7 @@ class Options:
     answered_by_script: bool = False
     day: "Day | None" = None
     deadlines: Deadlines = DEADLINES
-    observer: Observer = Nobody()
+    observer: Observer = NOBODY
 
     def site_of(self, experiment: Experiment, uri: str) -> SiteFile | None:
         """The site file that a flight of an experiment is flown with (as `ivl.site.require.for_flight`)."""
