@@ -2,7 +2,7 @@
 #
 # This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
 # Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS, VEHICLE, GEAR, SIL_ARGS,
-# FUZZ_RUNS, FUZZ_ARGS.
+# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS.
 
 PYTHON     ?= python3
 CLANG      ?= clang-14
@@ -70,6 +70,11 @@ figs: setup build ## the paper's figures 4 to 9 from RUN=... (a sweep's run fold
 	$(say) 'figs: $(RUN)'
 	@test -n '$(RUN)' || { echo 'figs: say which run, for example: make figs RUN=runs/paper-as_simulated-bo'; exit 2; }
 	@$(BIN)/ivl figs $(RUN)
+
+.PHONY: cad
+cad: setup build openscad ## legs and jigs to print, as STL in build/cad (CAD_ARGS='--gear-set mine.yaml --gear wide'; tools/cad.py --help)
+	$(say) 'cad: models of cad/ with the numbers of the gear file'
+	@$(BIN)/python tools/cad.py $(CAD_ARGS)
 
 ##@ The vehicle's processor
 
@@ -244,9 +249,9 @@ test-physics: setup-dev build ## landings with known properties, and a sample of
 	@$(BIN)/python -m pytest tests/physics $(PYTEST_ARGS)
 
 .PHONY: test-report
-test-report: setup-dev build chromium ## reports in a real browser, exports read back by the formats' own readers
-	$(say) 'test-report: pytest tests/report'
-	@$(BIN)/python -m pytest tests/report $(PYTEST_ARGS)
+test-report: setup-dev build chromium openscad ## reports and the live view in a real browser, exports and printable models read back
+	$(say) 'test-report: pytest tests/report tests/live tests/cad'
+	@$(BIN)/python -m pytest tests/report tests/live tests/cad $(PYTEST_ARGS)
 
 .PHONY: step-study
 step-study: setup-dev build ## ten thousand landings with shorter and shorter steps (2 min)
@@ -321,6 +326,10 @@ cross-toolchain: ## install what compiles for the vehicle and emulates it (Debia
 .PHONY: chromium
 chromium: ## install the browser that the reports are tested in (Debian; needs root only if it is missing)
 	@tools/apt_install.sh chromium:chromium
+
+.PHONY: openscad
+openscad: ## install the program that makes the printable models (Debian; needs root only if it is missing)
+	@tools/apt_install.sh openscad:openscad
 
 .PHONY: qt-libraries
 qt-libraries: setup-dev ## install what cfclient's windows are drawn with (Debian; needs root only if something is missing)

@@ -2,8 +2,11 @@
 
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # Flights with known answers are replayed by the tests of flights and by those on the emulated chip.
@@ -16,3 +19,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # The same examples in every run, none judged by how long it takes: a failure is one of the code, not of the machine.
 settings.register_profile("ivl", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("ivl")
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """A real browser, one for all tests of a session."""
+    from browsing import browsing  # playwright is not needed elsewhere
+
+    with browsing() as opened:
+        yield opened

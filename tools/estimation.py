@@ -176,7 +176,7 @@ def rows_of_targets(cells: list[dict[str, Any]], runs: dict[str, Any]) -> list[l
         ],
         ["the same: NEES, and share within 2 sigma", "1, 90 to 99 %", honesty],
         ["the same with the delay unknown: error", "-", errors(unknown)],
-        ["formula without its guards: error (with them it does not trigger)", "-", errors(raw)],
+        [f"formula without its guards: error of the {percent(raw['triggered'])} that trigger", "-", errors(raw)],
         ["filter, delays known: rows with 90 to 99 % within 2 sigma", "all", f"{len(honest)} of {len(known)}"],
         [
             "landing rate lost from (i) to (iii), recommended policies",

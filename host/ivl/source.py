@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl.belief.recording import simulated
+from ivl.errors import RolloutError
 from ivl.experiment import Experiment
 from ivl.outcome import Outcomes, valid
-from ivl.world import World
+from ivl.world import CANNOT_BEGIN, REFUSED, World
 
 
 @dataclass(frozen=True)
@@ -152,8 +153,14 @@ def by_parameter(theta: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64
 
 
 def portions(world: World, outcomes: Outcomes) -> Iterator[Flown]:
-    """A whole plan's outcomes: what is to be scored, and what the simulation could not bring to an end."""
+    """A whole plan's outcomes: what is to be scored, and what the simulation could not bring to an end.
+
+    Raises:
+        RolloutError: Not one of them could begin.
+    """
     good = valid(outcomes)
+    if len(outcomes) and all(world.end_reason(code) == REFUSED for code in set(outcomes["end_reason"].tolist())):
+        raise RolloutError(f"no landing can begin: {CANNOT_BEGIN}")
     yield Flown(np.flatnonzero(good), outcomes[good])
     if not good.all():
         reasons = sorted({world.end_reason(code) for code in outcomes["end_reason"][~good]})

@@ -25,6 +25,9 @@ START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2, "state": 3}
 _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within seconds
 _SEED_MAX = 2**64 - 1
 _THREADS_MAX = 256
+REFUSED = "refused"
+"""End of a landing that could not begin."""
+CANNOT_BEGIN = "the start lies in the ceiling or behind it, or the flight core refuses the policy"
 _LEVEL_OUT = "level_out"
 _QUATERNION_SLACK = 4e-4
 _HOVER_S_MAX, _HOVER_M_MAX = 600.0, 100.0
@@ -279,6 +282,8 @@ class World:
         if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
             raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
         rows, outcome = self._native.trace(specs(slice(0, 1)), period_s)
+        if self.end_reason(outcome["end_reason"][0]) == REFUSED:
+            raise ArgumentError(f"trace: this landing cannot begin: {CANNOT_BEGIN}")
         return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
 
     def hover(

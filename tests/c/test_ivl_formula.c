@@ -40,9 +40,9 @@ static void test_the_formula_is_exact_for_any_motion_with_acceleration(void)
 
 static void test_sigma_is_that_of_the_propagated_errors(void)
 {
-    // d = 2 / (5 - 1) = 0.5; dd/da = 1/4, dd/drate = -d/4, dd/drrev = d 2 rrev / 4
-    const ivl_formula_distance_t found = ivl_formula_compute(&cfg, 1.0f, 5.0f, 2.0f, 0.01f, 0.04f, 0.09f);
-    const float                  expected = sqrtf(0.09f / 16.0f + 0.25f * 0.04f / 16.0f + 0.25f * 4.0f * 0.01f / 16.0f);
+    // d = 2 / (6.25 - 1.5^2) = 0.5; dd/da = 1/4, dd/drate = -d/4, dd/drrev = d 2 rrev / 4
+    const ivl_formula_distance_t found = ivl_formula_compute(&cfg, 1.5f, 6.25f, 2.0f, 0.01f, 0.04f, 0.09f);
+    const float                  expected = sqrtf(0.09f / 16.0f + 0.25f * 0.04f / 16.0f + 0.25f * 9.0f * 0.01f / 16.0f);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.5f, found.d_m);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, expected, found.sigma_m);
 }

@@ -118,7 +118,11 @@ static void test_rules_have_an_act(void)
         }
     }
     TEST_ASSERT_EQUAL_INT(IVL_ACT_NONE, ivl_guard_act(IVL_RULE_COUNT));
-    TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_COUNT, IVL_PHASE_IDLE));
+    for (int phase = 0; phase < (int)IVL_PHASE_COUNT; phase++)
+    {
+        TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_COUNT, (ivl_phase_t)phase));
+        TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_NONE, (ivl_phase_t)phase));
+    }
     TEST_ASSERT_FALSE(ivl_guard_applies(IVL_RULE_STATE, IVL_PHASE_COUNT));
     for (int i = 1; i < (int)IVL_RULE_COUNT; i++)
     {
@@ -600,6 +604,15 @@ static void test_rule_landed_follows_hover_and_descent(void)
     assert_motors_off(&fix);
 }
 
+static void test_a_vehicle_that_is_low_has_not_landed_before_its_descent_has_ended(void)
+{
+    fix_to_phase(&fix, IVL_PHASE_ABORTED);
+    fix.in.p_WB_m.z = 0.5f * fix.cfg.land_height_m;
+    fix_tick(&fix);
+    TEST_ASSERT_NOT_EQUAL_INT(IVL_RULE_LANDED, fix.state.guard.rule);
+    TEST_ASSERT_TRUE(fix.out.motors_on);
+}
+
 static void test_landing_ends_on_a_table_that_stands_higher_than_land_height(void)
 {
     bring_to(IVL_PHASE_ABORTED);
@@ -800,6 +813,35 @@ static void test_lock_out_begins_with_the_trigger_and_survives_the_kill_switch(v
     }
 }
 
+static void test_the_lock_out_lasts_longer_than_rearm_s(void)
+{
+    fix_to_phase(&fix, IVL_PHASE_IDLE);
+    // sums that are exact
+    fix.cfg.tick_hz = 512.0f;
+    fix.cfg.rearm_s = 0.25f;
+    ivl_init(&fix.cfg, &fix.state);
+    fix.state.guard.locked_out = true;
+    fix.in.vitals = good_vitals();
+    fix.in.cmd.request = IVL_REQUEST_IDLE;
+    for (int i = 0; i < 128; i++)
+    {
+        fix_tick(&fix);
+    }
+    TEST_ASSERT_EQUAL_FLOAT(0.25f, fix.state.guard.rest_s);
+    TEST_ASSERT_TRUE(fix.state.guard.locked_out);
+    fix_tick(&fix);
+    TEST_ASSERT_FALSE(fix.state.guard.locked_out);
+}
+
+static void test_a_cycle_that_begins_with_its_approach_ends_the_lock_out_as_well(void)
+{
+    fix_to_phase(&fix, IVL_PHASE_IDLE);
+    fix.state.guard.locked_out = true;
+    fix_request(&fix, IVL_REQUEST_APPROACH);
+    assert_phase(IVL_PHASE_APPROACH, &fix);
+    TEST_ASSERT_FALSE(fix.state.guard.locked_out);
+}
+
 static void test_lock_out_follows_an_abort_that_has_cut_the_motors_and_a_new_cycle_ends_it(void)
 {
     bring_to(IVL_PHASE_ABORTED);
@@ -851,6 +893,7 @@ int main(void)
     RUN_TEST(test_flip_ignores_every_fault_that_is_not_its_own);
     RUN_TEST(test_rule_lost_cuts_the_motors_of_an_aborted_vehicle_that_cannot_hover);
     RUN_TEST(test_rule_landed_follows_hover_and_descent);
+    RUN_TEST(test_a_vehicle_that_is_low_has_not_landed_before_its_descent_has_ended);
     RUN_TEST(test_landing_ends_on_a_table_that_stands_higher_than_land_height);
     RUN_TEST(test_rule_no_policy_holds_the_trigger);
     RUN_TEST(test_rule_one_shot_holds_a_second_trigger);
@@ -860,6 +903,8 @@ int main(void)
     RUN_TEST(test_lock_out_lasts_until_the_vehicle_rests_upright_and_nobody_asks_for_thrust);
     RUN_TEST(test_each_condition_of_rest_alone_keeps_the_lock_out);
     RUN_TEST(test_lock_out_begins_with_the_trigger_and_survives_the_kill_switch);
+    RUN_TEST(test_the_lock_out_lasts_longer_than_rearm_s);
+    RUN_TEST(test_a_cycle_that_begins_with_its_approach_ends_the_lock_out_as_well);
     RUN_TEST(test_lock_out_follows_an_abort_that_has_cut_the_motors_and_a_new_cycle_ends_it);
     return UNITY_END();
 }

@@ -358,6 +358,23 @@ static void test_spoiled_inputs_never_trigger_and_end_in_a_safe_phase_from_every
     }
 }
 
+/// Each half of what arming asks of a tick, spoiled alone: a good request that was taken before does not stand in for a bad one.
+static void test_arming_needs_state_and_command_of_the_same_tick(void)
+{
+    fix_to_phase(&fix, IVL_PHASE_IDLE);
+    const ivl_in_t good = fix.in;
+    fix.in.q_WB.w = NAN;
+    fix_request(&fix, IVL_REQUEST_HOVER);
+    assert_phase(IVL_PHASE_IDLE, &fix);
+    fix.in.q_WB = good.q_WB;
+    fix.in.cmd.p_hover_W_m.x = NAN;
+    fix_tick(&fix);
+    assert_phase(IVL_PHASE_IDLE, &fix);
+    fix.in.cmd.p_hover_W_m = good.cmd.p_hover_W_m;
+    fix_tick(&fix);
+    assert_phase(IVL_PHASE_READY, &fix);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -387,5 +404,6 @@ int main(void)
     RUN_TEST(test_aborted_stays_off_when_the_state_comes_back);
     RUN_TEST(test_short_gap_in_the_inputs_is_flown_through);
     RUN_TEST(test_spoiled_inputs_never_trigger_and_end_in_a_safe_phase_from_every_phase);
+    RUN_TEST(test_arming_needs_state_and_command_of_the_same_tick);
     return UNITY_END();
 }

@@ -67,6 +67,18 @@ static void test_too_little_room_gives_the_root_of_the_quadratic(void)
     TEST_ASSERT_EQUAL_FLOAT(2.0f, aim_from_rest(&cfg, 0.9652f, 0.0f, 0.1f).vz_mps);
 }
 
+static void test_speed_along_the_ceiling_ends_at_the_fence(void)
+{
+    const ivl_cfg_t  cfg = region_cfg();
+    const ivl_room_t room = distance(2.0f);
+    const ivl_vec3_t p = {cfg.fence_x_m_max - 1.0f, 0.0f, 0.0f}, v = {0.6f, 0.0f, 0.0f};
+    const ivl_aim_t  aim = ivl_region_aim(&cfg, &room, p, v, asked(0.0f, 0.1f));
+    TEST_ASSERT_EQUAL_FLOAT(2.0f, aim.vz_mps);
+    // what is there carries on for as long as the change from (0.6, 0) to (1.2, 2) takes, and then there are 2 m at 2 m/s
+    const float carried_m = 0.5f * 0.6f * sqrtf(0.6f * 0.6f + 2.0f * 2.0f) / 4.3f;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, root_of_the_quadratic(4.3f, 1.0f, 1.0f - carried_m, 0.0f), aim.vx_mps);
+}
+
 static void test_speed_that_is_there_already_needs_less_room(void)
 {
     ivl_cfg_t cfg = region_cfg();
@@ -436,6 +448,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_with_enough_room_the_aim_is_the_region_or_what_is_asked_beyond_it);
     RUN_TEST(test_too_little_room_gives_the_root_of_the_quadratic);
+    RUN_TEST(test_speed_along_the_ceiling_ends_at_the_fence);
     RUN_TEST(test_speed_that_is_there_already_needs_less_room);
     RUN_TEST(test_fence_above_counts_as_room_also_when_the_distance_is_not_known);
     RUN_TEST(test_fence_ahead_limits_the_speed_along_the_ceiling);

@@ -7,8 +7,6 @@ from pathlib import Path
 import ivl  # isort: split
 
 import pytest
-from browsing import browsing
-from playwright.sync_api import Browser
 
 from ivl import experiment, yamlfile
 from ivl.experiment import Experiment
@@ -60,9 +58,3 @@ def view_of(tmp_path: Path) -> OPEN:
         return View(chosen, tmp_path / "run", ("127.0.0.1", 0), in_process, heard.append)
 
     return open_view
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    with browsing() as opened:
-        yield opened

@@ -143,14 +143,14 @@ def test_a_bank_is_flown_once_and_its_name_says_what_it_depends_on(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     flown: list[int] = []
-    first = Simulator.of(kin, FLIGHT, n_members=24, progress=lambda done, _: flown.append(done))
-    assert flown == list(range(1, 25))
-    second = Simulator.of(kin, FLIGHT, n_members=24, progress=lambda done, _: flown.append(done))
-    assert len(flown) == 24
+    first = Simulator.of(kin, FLIGHT, n_members=8, progress=lambda done, _: flown.append(done))
+    assert flown == list(range(1, 9))
+    second = Simulator.of(kin, FLIGHT, n_members=8, progress=lambda done, _: flown.append(done))
+    assert len(flown) == 8
     assert (first.recordings.weights == second.recordings.weights).all()
     wider = family.of(kin.world, CHOICE.model_copy(update={"scale": 2.0}))
-    Simulator.of(wider, FLIGHT, n_members=24)
-    Simulator.of(kin, Flight(2.6, 90.0, "constant", "imparted", BOUNDS), n_members=24)
+    Simulator.of(wider, FLIGHT, n_members=8)
+    Simulator.of(kin, Flight(2.6, 90.0, "constant", "imparted", BOUNDS), n_members=8)
     assert len(list((tmp_path / "ivl").iterdir())) == 3
 
 
@@ -497,7 +497,7 @@ def test_without_a_simulator_it_is_ephe_with_a_memory() -> None:
 @pytest.fixture
 def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> experiment.Experiment:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("ivl.belief.simulator.MEMBERS", 40)
+    monkeypatch.setattr("ivl.belief.simulator.MEMBERS", 24)
     coarse = ["check.grid.rrev_c_per_s.step=1.0", "check.grid.moment_y_Nmm.step=4.0", "learner.options.n_particles=32"]
     settings = [*coarse, "n_rollouts=4", "budget=16", "check.effort=0.02", "check.n_fresh=20", "start=imparted"]
     return experiment.load("experiments/paper_flight.yaml", settings, learner="ephe_belief")

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 import ivl
-from ivl import native
+from ivl import cli, native
+from ivl.errors import ArgumentError, RolloutError
 from ivl.experiment import Experiment
 from ivl.source import Plan, WorldSource
 
@@ -40,3 +41,22 @@ def test_a_rollout_that_the_simulation_could_not_finish_is_discarded_with_the_re
     scored, discarded = WorldSource(world, small).fly(plan)
     assert (scored.index.tolist(), scored.discarded) == ([0, 2], "")
     assert (discarded.index.tolist(), discarded.discarded) == ([1], "simulation: not_finite")
+
+
+@pytest.mark.parametrize(("speed_mps", "angle_deg"), [(0.1, 20.0), (0.1, 90.0), (0.12, 25.0)])
+def test_a_start_in_the_ceiling_is_refused_and_not_learned_from(
+    small: Experiment, speed_mps: float, angle_deg: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The body reaches further up than the approach is long: speed x 1 s."""
+    world, own = small.make_world(), small.model_copy(update={"speed_mps": speed_mps, "angle_deg": angle_deg})
+    plan = Plan(np.full((3, 2), (4.8, 8.0)), np.zeros(3, dtype=np.uint64), np.arange(3, dtype=np.uint64))
+    if speed_mps * np.sin(np.radians(angle_deg)) > 0.09:
+        assert sum(len(portion.outcomes) for portion in WorldSource(world, own).fly(plan)) == 3
+        return
+    with pytest.raises(RolloutError, match="no landing can begin: the start lies in the ceiling"):
+        list(WorldSource(world, own).fly(plan))
+    with pytest.raises(ArgumentError, match="cannot begin: the start lies in the ceiling"):
+        world.trace(speed_mps, angle_deg, 4.8, 8.0)
+    policy = ["--rrev", "4.8", "--moment", "8", "--json"]
+    assert cli.run(["rollout", "--speed", str(speed_mps), "--angle", str(angle_deg), *policy]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

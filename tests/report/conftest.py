@@ -6,7 +6,7 @@ from typing import Any
 
 import policies
 import pytest
-from browsing import DEADLINE_MS, browsing
+from browsing import DEADLINE_MS
 
 import ivl  # isort: split
 
@@ -94,12 +94,6 @@ def policy_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     page = folder / "page.html"
     assert cli.run(["policy", "report", str(folder / "g.yaml"), "--out", str(page), "--approaches", "30"]) == 0
     return page
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    with browsing() as opened:
-        yield opened
 
 
 class Visit:

@@ -4,12 +4,11 @@ Both consoles print text as it is: no path, name or message of a user is markup.
 `rich.text.Text`.
 """
 
-import io
 import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import IO, Any, cast
 
 import numpy as np
 from rich.console import Console
@@ -23,7 +22,7 @@ from ivl.learning.loop import Progress
 Heard = Callable[[str], None]
 
 
-class _Stderr(io.TextIOBase):
+class _Stderr:
     """Standard error as it is at the moment, and whoever listens to it."""
 
     heard: Heard | None = None
@@ -47,7 +46,7 @@ class _Stderr(io.TextIOBase):
         return sys.stderr.fileno()
 
     @property
-    def encoding(self) -> str:  # type: ignore[override]
+    def encoding(self) -> str:
         """Its encoding."""
         return sys.stderr.encoding
 
@@ -55,7 +54,7 @@ class _Stderr(io.TextIOBase):
 _STDERR = _Stderr()
 _LITERAL: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False, "soft_wrap": True}
 out = Console(**_LITERAL)
-err = Console(file=_STDERR, **_LITERAL)
+err = Console(file=cast(IO[str], _STDERR), **_LITERAL)
 
 _SHOWN_MAX = 4  # parameters in a line of progress
 MODEL_FITS = {True: "model fits", False: "NO MODEL FITS", None: "no model"}

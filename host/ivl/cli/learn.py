@@ -51,7 +51,7 @@ Examples:
   ivl learn experiments/paper_flight.yaml --site lab.yaml --rehearse --live
       the same, shown in a browser, with a button that stops the vehicle; see docs/LIVE.md
   ivl learn experiments/paper_flight.yaml --site lab.yaml --uri site
-      the drone there; see docs/HARDWARE.md, docs/SITE.md and docs/HOST.md first
+      the drone there; see docs/PROCEDURE.md and docs/SITE.md first
   ivl learn experiments/paper_vertical.yaml --policy g.yaml
       the search begins at the numbers of a policy for every approach
   ivl learn experiments/paper_flight.yaml --from runs/monday --from runs/tuesday

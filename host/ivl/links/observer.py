@@ -43,3 +43,6 @@ class Nobody:
 
     def landed(self, landing: "Landing") -> None:
         """Do nothing."""
+
+
+NOBODY = Nobody()

@@ -44,6 +44,8 @@ class Pump:
         self._replay: Replay | None = None
         self._beside: asyncio.Future[None] | None = None
         self._next_read_s = 0.0
+        self.ticked = asyncio.Condition()
+        """Notified when the parts may have changed."""
         self._put("room", room.room_of(experiment, self.world))
 
     async def run(self, show: Callable[[Flight], None], ended: asyncio.Event) -> None:
@@ -53,12 +55,16 @@ class Pump:
             row = self._tick()
             if row is not None:
                 show(row)
+            async with self.ticked:
+                self.ticked.notify_all()
             due_s = max(due_s + PERIOD_S, time.monotonic())
             await asyncio.sleep(due_s - time.monotonic())
         if self._beside is not None:
             await self._beside
         await asyncio.to_thread(self._look_beside)
         self._tick()
+        async with self.ticked:
+            self.ticked.notify_all()
 
     def _put(self, name: str, data: Any) -> None:
         text = plain.text({"part": name, "data": data})

@@ -8,10 +8,11 @@ for it. Anybody who reaches the address may look; only who has the token may sto
 import asyncio
 import hmac
 import json
+import socket
 from pathlib import Path
 from typing import Any
 
-from tornado import httpserver, netutil, web, websocket
+from tornado import httpserver, web, websocket
 from tornado.iostream import StreamClosedError
 
 from ivl.errors import ConfigError, StoreError
@@ -22,6 +23,8 @@ ASSETS = Path(__file__).parent
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 TOKEN_HEADER = "X-Ivl-Token"
 CLIENTS_MAX = 16
+SEND_BYTES = 65536
+"""The system keeps no more for a client: what it has not read would only be older."""
 STALLED_S = 10.0
 """A client that takes nothing for so long is dropped."""
 _FILES = {"": "live.html", "live.css": "live.css", "draw.js": "draw.js", "plots.js": "plots.js", "live.js": "live.js"}
@@ -44,10 +47,13 @@ class Server:
         self.loopback = host in LOOPBACK
         self.clients: set[News] = set()
         try:
-            self._sockets = netutil.bind_sockets(port, host)
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            self._socket = socket.create_server((host, port), family=family)
         except OSError as error:
             raise ConfigError(f"--live-at {host}:{port}: {error.strerror}: choose another with --live-at") from error
-        self.port: int = self._sockets[0].getsockname()[1]
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)  # a connection takes it over
+        self.port: int = self._socket.getsockname()[1]
         self._http: httpserver.HTTPServer | None = None
 
     def begin(self) -> None:
@@ -55,7 +61,7 @@ class Server:
         own: dict[str, Any] = {"server": self}
         routes: list[Any] = [(r"/news", News, own), (r"/stop", StopButton, own), (r"/(.*)", Asset, own)]
         self._http = httpserver.HTTPServer(web.Application(routes, log_function=_say_nothing), max_body_size=1024)
-        self._http.add_sockets(self._sockets)
+        self._http.add_sockets([self._socket])
 
     async def end(self) -> None:
         """Give each client its last news, for a moment, and close."""
@@ -148,15 +154,29 @@ class News(_Guarded, websocket.WebSocketHandler):
             while True:
                 for name, part in list(self.server.pump.parts.items()):
                     if has.get(name) != part.version:
-                        await asyncio.wait_for(self.write_message(part.text), STALLED_S)
+                        await self._send(part.text)
                         has[name] = part.version
-                await asyncio.sleep(PERIOD_S)
+                async with self.server.pump.ticked:
+                    await self.server.pump.ticked.wait()
         except (websocket.WebSocketClosedError, StreamClosedError):
             pass  # it has gone
         except TimeoutError:
             self.close(1008, "too slow")
         finally:
             self.server.clients.discard(self)
+
+    async def _send(self, text: str) -> None:
+        """Return when the system has taken it.
+
+        Raises:
+            TimeoutError: The client takes nothing.
+        """
+        sent = asyncio.ensure_future(self.write_message(text))
+        taken, _ = await asyncio.wait({sent}, timeout=STALLED_S)
+        if not taken:
+            sent.add_done_callback(lambda late: late.exception())  # it will only say that the client is gone
+            raise TimeoutError
+        sent.result()
 
     def on_message(self, message: str | bytes) -> None:
         """Nothing is taken."""

@@ -3,6 +3,8 @@
 What a client does not take in time is dropped by the SDK, whose threads are its own. Clients can send nothing.
 """
 
+from typing import Any
+
 from ivl.errors import ConfigError, IvlError
 from ivl.export import schemas, topics
 from ivl.export.flight import Flight
@@ -44,7 +46,7 @@ class Stream:
         for t_ns, topic, message in topics.messages(row):
             self._channels[topic].log(topics.encoded(message), log_time=t_ns)
 
-    def _channel(self, topic: str, name: str, row: Flight) -> "object":
+    def _channel(self, topic: str, name: str, row: Flight) -> Any:
         """A topic as clients see it; the columns of a run's rows are the same all through the run."""
         schema = self._sdk.Schema(name=name, encoding="jsonschema", data=schemas.text(name, row.columns))
         return self._sdk.Channel(topic, message_encoding="json", schema=schema, context=self._context)

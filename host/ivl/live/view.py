@@ -1,7 +1,6 @@
 """The live view of one run: a thread with the page and the stream, until it is closed.
 
-with View(experiment, folder, "127.0.0.1", 8764, in_process=False, say=print) as view:
-    ...  # tell view.board
+Opened as a context manager, it serves; what it shows is what its `board` is told.
 """
 
 import asyncio
