@@ -10,7 +10,7 @@ import pytest
 from logs import Truth, cfclient_text, habas_rows, habas_text, recording_text
 from test_formats import BLOCKS
 
-from ivl import cli, experiment, run, store
+from ivl import cli, experiment, recordings, run, store
 from ivl.flight import store as flights
 from ivl.seeds import Purpose, derive
 
@@ -205,7 +205,7 @@ def run_folder(truth: Truth, tmp_path: Path) -> Path:
     (folder / "recordings").mkdir()
     seed = derive(chosen.seed, Purpose.WORLD)
     for stream in (5, 2, 0):
-        (folder / "recordings" / f"{seed:016x}-{stream}.csv").write_text(recording_text(truth))
+        recordings.path_of(folder, seed, stream).write_text(recording_text(truth))
     entry = {"seed": seed, "stream": 2, "what": "flown", "battery_V": 3.91, "n_legs": 4}
     other = {"seed": seed, "stream": 5, "what": "discarded: x"}
     (folder / "flights.jsonl").write_text(json.dumps(other) + "\n" + json.dumps(entry) + "\n")

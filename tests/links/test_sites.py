@@ -138,7 +138,7 @@ def test_new_site_is_a_class_and_a_row(server: SilProcess, vertical: Experiment,
     assert server.get("sil.lockstep") == 0, "time must pass for whoever comes next"
     (line,) = (tmp_path / "flights.jsonl").read_text().splitlines()
     assert (json.loads(line)["what"], json.loads(line)["n_legs"]) == ("flown", 4)
-    assert [path.name for path in (tmp_path / "recordings").iterdir()] == [f"{7:016x}-0.csv"]
+    assert [path.name for path in (tmp_path / "recordings").iterdir()] == [f"rollout-001-{7:016x}.csv"]
 
 
 def open_the_door(_: Rollout) -> None:

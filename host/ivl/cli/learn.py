@@ -140,6 +140,8 @@ def learn(
             words += ["--uri", uri] if uri and not uri.startswith(links.REHEARSAL_SCHEME) else []
             words += ["--mocap", mocap] if mocap else []
             words += [word for word, said in (("--rehearse", rehearse), ("--other-world", other_world)) if said]
+            words += ["--script", script] if script else []
+            words += ["--answers", answers] if answers else []
             console.say(f"interrupted; continue with: {shlex.join(words)}")
             raise
     pictures, failure = _draw(result) if n_trials is None else ([], None)
