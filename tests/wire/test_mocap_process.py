@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -153,6 +154,40 @@ def test_jump_is_named_and_not_sent(cameras: Cameras) -> None:
         wait_for(lambda: heard.statuses[-1] is Status.JUMPED, "jumped")
         assert max(x for x, *_ in sink.poses) < 1.5
         assert mocap.state().counts.n_jumps == 1
+
+
+def test_frames_and_hostile_counts_of_another_sender_are_not_heard(cameras: Cameras) -> None:
+    """From another socket of the same computer; a stranger's pose is not even a jump, and ends no client."""
+    sink, heard = Sink(), Heard()
+    stranger = NatNetServer([BODY, "box"])
+    stranger._target = cameras.server._target
+    hostile = struct.pack("<2H2i", 7, 8, 1, 2**31 - 1)
+    try:
+        with Mocap(config(), sink, cameras.request) as mocap:
+            mocap.guard = heard
+            mocap.wait_until_good()
+            n_frames, n_sent = mocap.state().counts.n_frames, len(sink.poses)
+            for _ in range(50):
+                stranger.send({BODY: (7.0, 7.0, 1.0, 0.0, 0.0, 0.0, 1.0)})
+                stranger._data.sendto(hostile, stranger._target)
+            wait_for(lambda: len(sink.poses) > n_sent + 20, "the vehicle's own poses")
+            state = mocap.state()
+        assert state.counts.n_jumps == state.n_restarts == 0
+        assert state.counts.n_frames > n_frames
+        assert max(x for x, *_ in sink.poses) < 1.5
+        assert not {Status.JUMPED, Status.FAILED} & set(heard.statuses)
+    finally:
+        stranger.close()
+
+
+def test_hostile_count_of_the_server_itself_ends_the_client_and_not_the_host(cameras: Cameras) -> None:
+    heard = Heard()
+    with Mocap(config(restart_s=1.2), None, cameras.request) as mocap:
+        mocap.guard = heard
+        mocap.wait_until_good()
+        cameras.server._data.sendto(struct.pack("<2H2i", 7, 8, 1, 2**31 - 1), cameras.server._target)
+        wait_for(lambda: Status.FAILED in heard.statuses, "the end of the client")
+        wait_for(lambda: Status.GOOD in heard.statuses[heard.statuses.index(Status.FAILED) :], "good again")
 
 
 def test_guard_hears_each_status(cameras: Cameras) -> None:
