@@ -37,7 +37,6 @@ void app_begin_anew(void)
     app->state.has_policy = has_policy;
     app->handover = (ivl_handover_t){0.0f, 0.0f};
     app->recorder.last_phase = IVL_PHASE_IDLE;
-    app->begins_in_approach = true;
     forget_senses(app);
 }
 
