@@ -123,6 +123,9 @@ def test_a_cut_loses_everything_until_it_is_ended(sil, Raw, wait_for):
         client.connect()
         sil.set("fault.cut_ms", 4_000_000)
         wait_for("the cut", lambda: (client.send("fc00"), sil.get("fault.n_lost"))[1] > 3)
+        client.come()  # answers from before the cut came into force
+        lost = sil.get("fault.n_lost")
+        wait_for("more losses", lambda: (client.send("fc00"), sil.get("fault.n_lost"))[1] > lost + 3)
         assert client.silent()
         sil.set("fault.cut_ms", 0)
         wait_for("the end of the cut", lambda: (client.send("fc01"), not client.silent())[1])
