@@ -236,7 +236,7 @@ def believe(logs: list[Path]) -> dict[str, Any]:
     whole, *_ = results.values()
     flights_belief.draw(whole, BELIEF_PICTURE)
     guards = {name: flights_belief.summary(result) for name, result in results.items()}
-    return {**flights_belief.summary(whole), "n_flights": len(told), "guards": guards, **whole}
+    return {**flights_belief.summary(whole), "n_flights": len(told), "guards": guards}
 
 
 def main() -> int:
