@@ -14,12 +14,12 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from ivl import forms, model, yamlfile
-from ivl.errors import ConfigError
+from ivl.errors import ArgumentError, ConfigError
 from ivl.experiment import Experiment
 from ivl.seeds import Purpose, derive
 from ivl.settings import Finite, check_overrides, read_mapping
 from ivl.task import Task, settings_of
-from ivl.world import Trace, World
+from ivl.world import CANNOT_BEGIN, REFUSED, Trace, World
 
 TRACE_PERIOD_S = 0.001
 """Finest useful period: rows come once a tick of the flight core at the most."""
@@ -63,7 +63,11 @@ class LandingSpec(Task):
         return dict(zip(forms.by_name(self.form).names, self.theta, strict=True))
 
     def fly(self, world: World | None = None, period_s: float = TRACE_PERIOD_S) -> tuple[World, Trace]:
-        """Fly it and record the time series; a world that exists already saves building one."""
+        """Fly it and record the time series; a world that exists already saves building one.
+
+        Raises:
+            ArgumentError: It cannot begin.
+        """
         world = world or self.make_world()
         trace = world.trace(
             self.speed_mps,
@@ -76,6 +80,8 @@ class LandingSpec(Task):
             stream=self.stream,
             period_s=period_s,
         )
+        if world.end_reason(trace.outcome["end_reason"]) == REFUSED:
+            raise ArgumentError(f"this landing cannot begin: {CANNOT_BEGIN}")
         return world, trace
 
 

@@ -282,8 +282,6 @@ class World:
         if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
             raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
         rows, outcome = self._native.trace(specs(slice(0, 1)), period_s)
-        if self.end_reason(outcome["end_reason"][0]) == REFUSED:
-            raise ArgumentError(f"trace: this landing cannot begin: {CANNOT_BEGIN}")
         return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
 
     def hover(
