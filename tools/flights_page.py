@@ -238,7 +238,8 @@ family is the vehicle that flew.
 
 Which guard does that need? Each was taken away in turn, and then all of them. They are those of every run (MODEL, section 17):
 the motion of flights counts like that of three at most, any model has errors that all flights share, an outcome may say nothing,
-and what no member explains is learned from outcomes near by. They were chosen on simulated vehicles, and not changed for these flights.
+and what no member explains is learned from outcomes near by. Their idea and
+some of their sizes come from an earlier study of these very flights, so they are no independent choice; they were not changed here.
 
 {_table("| guards | window reaches flown landings after flight | stays from flight | rate expected where flights landed |", _guards(b))}
 
