@@ -22,7 +22,7 @@ from ivl.learners.ephe import above_mean, most_likely
 FloatArray = npt.NDArray[np.float64]
 
 N_APPROACHES = 128
-_SHOTS = 4
+_SHOTS = 32
 """Imagined flights of a policy in an update, each at one approach with one particle, one timing and one moment."""
 
 
@@ -116,7 +116,7 @@ def ephe(
     lo, hi = bounds.T
     for _ in range(iterations):
         theta = draw_truncated(rng, mu, sigma, lo, hi, n)
-        at = rng.integers(len(form.approaches), size=_SHOTS * 8)
+        at = rng.integers(len(form.approaches), size=_SHOTS)
         flights = form.of(at).flights(theta, float(box[1, 1]))
         late = rng.uniform(-decide.TIMING_S, decide.TIMING_S, len(at))
         moment = rng.uniform(-decide.MOMENT, decide.MOMENT, len(at))
