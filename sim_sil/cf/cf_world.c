@@ -179,6 +179,7 @@ void ivl_cf_world_tick(ivl_cf_t *cf)
         ivl_cf_neighbours_tell(cf);
         ivl_cf_neighbours_bump(cf);
     }
+    app_start_on_path(cf->set.sim.start != IVL_CF_START_AS_FLOWN);
     const ivl_phase_t before = app_core_state()->phase;
     ivl_sim_world_tick(&cf->group, IVL_CF_LANE);
     const ivl_phase_t after = app_core_state()->phase;

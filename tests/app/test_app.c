@@ -960,6 +960,23 @@ static void test_command_that_was_overtaken_is_not_obeyed_unless_it_stops(void)
     }
 }
 
+/// Moving up fast under a ceiling that is near: every condition of a flip holds but the time before it.
+static void test_one_packet_does_not_lead_from_idle_into_a_flip(void)
+{
+    start_in_flight();
+    sdk.state.position.z = 1.9f;
+    sdk.state.velocity.z = 2.5f;
+    const uint32_t n_trigger = ivl_app.state.diag.n_trigger;
+    heartbeat(IVL_REQUEST_APPROACH, 100);
+    TEST_ASSERT_EQUAL_INT(IVL_PHASE_IDLE, ivl_app.state.phase);
+    TEST_ASSERT_EQUAL_UINT32(n_trigger, ivl_app.state.diag.n_trigger);
+    // asked to hover first, it flips
+    heartbeat(IVL_REQUEST_HOVER, 20);
+    TEST_ASSERT_EQUAL_INT(IVL_PHASE_READY, ivl_app.state.phase);
+    heartbeat(IVL_REQUEST_APPROACH, 20);
+    TEST_ASSERT_EQUAL_UINT32(n_trigger + 1u, ivl_app.state.diag.n_trigger);
+}
+
 static void test_packets_arrive_through_the_task(void)
 {
     start();
@@ -1094,6 +1111,7 @@ int main(void)
     RUN_TEST(test_packets_are_answered_and_not_kept_when_another_controller_is_selected);
     RUN_TEST(test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat);
     RUN_TEST(test_command_that_was_overtaken_is_not_obeyed_unless_it_stops);
+    RUN_TEST(test_one_packet_does_not_lead_from_idle_into_a_flip);
     RUN_TEST(test_packets_arrive_through_the_task);
     RUN_TEST(test_noise_on_the_channel_starts_no_motor_and_breaks_nothing);
     return UNITY_END();

@@ -456,6 +456,21 @@ static void test_a_landing_may_be_asked_for_on_the_floor(void)
     TEST_ASSERT_EQUAL_MEMORY(&expected, &outcome, sizeof outcome);
 }
 
+/// A vehicle that is not put on a path is protected as a real one is.
+static void test_an_approach_as_flown_that_is_asked_for_on_the_floor_waits_for_ready(void)
+{
+    ivl_sim_model_t model;
+    open_noisy(&model);
+    run_ms(200);
+    (void)send_policy(7, 0.0f, 0.008f);
+    const double before = read_log("sil", "episode");
+    TEST_ASSERT_EQUAL_UINT8(IVL_PHASE_IDLE, send_command(IVL_REQUEST_APPROACH, 0.0f, 0.0f, 1.0f, 2.5f, 1.5f).phase);
+    run_ms(100);
+    assert_phase(IVL_PHASE_IDLE);
+    TEST_ASSERT_EQUAL_INT((int)before, (int)read_log("sil", "episode"));
+    TEST_ASSERT_EQUAL_INT(1, (int)read_log("sil", "grounded"));
+}
+
 static void test_numbers_of_a_start_are_kept_within_their_ranges(void)
 {
     ivl_sim_model_t model;
@@ -499,6 +514,7 @@ int main(void)
     RUN_TEST(test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_time);
     RUN_TEST(test_the_recording_of_a_landing_begins_at_its_start);
     RUN_TEST(test_a_landing_may_be_asked_for_on_the_floor);
+    RUN_TEST(test_an_approach_as_flown_that_is_asked_for_on_the_floor_waits_for_ready);
     RUN_TEST(test_numbers_of_a_start_are_kept_within_their_ranges);
     return UNITY_END();
 }

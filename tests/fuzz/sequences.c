@@ -89,8 +89,9 @@ typedef struct
     bool        landed;    ///< a flip was begun: motors are off but in it
     float       rest_ms;   ///< upright, at rest, nobody wants to fly
     uint32_t    n_trigger, policy_crc, policy_seq, cfg_crc;
-    uint32_t    n_step;   ///< of the stabilizer that was looked at last
-    int         stop_ms;  ///< since a request to stop has left the host; -1: none is under way
+    uint32_t    n_step;    ///< of the stabilizer that was looked at last
+    bool        is_cycle;  ///< READY was seen since IDLE
+    int         stop_ms;   ///< since a request to stop has left the host; -1: none is under way
     uint8_t     stop;
 } model_t;
 
@@ -151,6 +152,7 @@ static void check_flip(void)
     must(state->has_policy, "a flip without a policy");
     must(model.wanted == IVL_REQUEST_APPROACH, "a flip that nobody has asked for");
     must(state->policy.n == 2u, "a flip of a policy that expects no landing");
+    must(model.is_cycle, "a flip that one packet has led to from IDLE");
     must(1.0e-3f * (float)model.ready_ms + SLACK_S >= ivl_app.cfg.ready_s_min, "a flip without its time in READY");
     must(sdk.state.velocity.z + 1.0e-3f >= (d_m - 0.02f) * state->policy.theta[0], "a flip outside the policy's region");
     must((s->policy.crc == model.policy_crc) && (s->policy.seq == state->policy.id.seq), "a flip of another policy");
@@ -211,6 +213,7 @@ static void remember(ivl_phase_t phase)
 {
     model.ready_ms += (phase == IVL_PHASE_READY) ? 1 : 0;
     model.ready_ms = (phase == IVL_PHASE_IDLE) ? 0 : model.ready_ms;
+    model.is_cycle = (phase == IVL_PHASE_READY) || (model.is_cycle && (phase != IVL_PHASE_IDLE));
     if ((phase == IVL_PHASE_READY) && (model.phase != IVL_PHASE_READY))
     {
         model.ready_ms = 1;
@@ -430,6 +433,7 @@ static void switch_controller(uint8_t a)
         let_pass(1 + a);
         sdk.controller_runs = true;
     }
+    model.is_cycle = false;
     model.landed = model.landed || (ivl_app.state.phase != IVL_PHASE_IDLE) || ivl_app.state.guard.locked_out;
     controllerOutOfTreeInit();
     model.phase = IVL_PHASE_IDLE;
