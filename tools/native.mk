@@ -8,10 +8,12 @@ CLANG   ?= clang-14
 
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
-# sse2 and avx2 are the release held to registers of 128 and 256 bits
-FLAVOURS           := release O0 san sse2 avx2 clang clang-O0 fuzz
+# sse2 and avx2 are the release held to registers of 128 and 256 bits; the tests of `shared` link the product as libraries, so that a changed
+# source costs one link and not one for each test
+FLAVOURS           := release O0 shared san sse2 avx2 clang clang-O0 fuzz
 OPTIMISE_release   := -O3 -fno-semantic-interposition
 OPTIMISE_O0        := -O0
+OPTIMISE_shared    := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
 OPTIMISE_sse2      := -O3 -DIVL_SIM_WIDEST_BITS=128
 OPTIMISE_avx2      := -O3 -DIVL_SIM_WIDEST_BITS=256
@@ -85,6 +87,17 @@ SERVER  := host/ivl/_native/ivl_sil
 CRTP    := $(patsubst %.c,$(BUILD)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
 FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
 
+# what the tests link: the objects, or libraries of them, which are found from the root of the repository
+ifeq ($(FLAVOUR),shared)
+TESTED      := $(BUILD)/libtested.so
+TESTED_CF   := $(BUILD)/libtested_cf.so
+TESTED_CRTP := $(BUILD)/libtested_crtp.so
+else
+TESTED      := $(CORE) $(SIM)
+TESTED_CF   := $(CF)
+TESTED_CRTP := $(CRTP)
+endif
+
 .DELETE_ON_ERROR:
 .SECONDARY:
 .PHONY: core lib sil check fuzz FORCE
@@ -125,17 +138,33 @@ $(BUILD)/fuzz_crtp: $(BUILD)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP)
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(CORE) $(SIM) $(CRTP) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
-	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+define link_test
+@echo '  LINK  $@'
+@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o %.so,$^) $(LDLIBS)
+endef
 
-$(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
-	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(TESTED) $(TESTED_CRTP) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	$(link_test)
 
-$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(CORE) $(SIM) $(CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
-	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+$(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(TESTED) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	$(link_test)
+
+$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(TESTED) $(TESTED_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	$(link_test)
+
+define link_tested
+@echo '  LINK  $@'
+@$(COMPILER) $(CFLAGS) -shared -o $@ $(filter %.o,$^) $(LDLIBS)
+endef
+
+$(BUILD)/libtested.so: $(CORE) $(SIM)
+	$(link_tested)
+
+$(BUILD)/libtested_cf.so: $(CF)
+	$(link_tested)
+
+$(BUILD)/libtested_crtp.so: $(CRTP)
+	$(link_tested)
 
 run-test_%: $(BUILD)/test_% FORCE
 	@tools/run_unity.sh $<
