@@ -90,7 +90,13 @@ AREAS = (
     Area("firmware core", ("firmware/core/ivl_*.c",), 130, 0.97, ("test_ivl_*",), ("ivl_guard.c", "ivl_wire.c")),
     Area("guard", ("firmware/core/ivl_guard.c",), 50, 0.97, ("test_ivl_*",)),
     Area("app", ("firmware/app/app_*.c",), 60, 0.97, ("test_app", "test_cf_*"), ("app_port.c",)),
-    Area("wire", ("firmware/core/ivl_wire.c", "sim_sil/sil_wire.c"), 30, 0.97, ("test_ivl_wire", "test_ivl_parts")),
+    Area(
+        "wire",
+        ("firmware/core/ivl_wire.c", "sim_sil/sil_wire.c"),
+        30,
+        0.97,
+        ("test_ivl_wire", "test_ivl_parts", "test_sil_wire"),
+    ),
     Area("crtp", ("sim_sil/crtp/crtp_*.c",), 60, 0.92, ("test_crtp_*",), ("crtp_main.c", "crtp_udp.c")),
     Area(
         "learners", ("host/ivl/learners/*.py",), 50, 0.92, tuple(f"tests/py/test_{name}.py" for name in LEARNER_TESTS)

@@ -87,7 +87,7 @@ SERVER  := host/ivl/_native/ivl_sil
 CRTP    := $(patsubst %.c,$(BUILD)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
 FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
 
-# what the tests link: the objects, or libraries of them, which are found from the root of the repository
+# what the tests link: the objects, or libraries of them, which are found from the root of the repository; a library stands before what it needs
 ifeq ($(FLAVOUR),shared)
 TESTED      := $(BUILD)/libtested.so
 TESTED_CF   := $(BUILD)/libtested_cf.so
@@ -143,13 +143,13 @@ define link_test
 @$(COMPILER) $(CFLAGS) -o $@ $(filter %.o %.so,$^) $(LDLIBS)
 endef
 
-$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(TESTED) $(TESTED_CRTP) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(TESTED_CRTP) $(TESTED) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
 	$(link_test)
 
 $(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(TESTED) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
 	$(link_test)
 
-$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(TESTED) $(TESTED_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(TESTED_CF) $(TESTED) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
 	$(link_test)
 
 define link_tested
