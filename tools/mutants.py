@@ -272,14 +272,14 @@ def copy_tree() -> None:
 
 
 def programs(area: Area) -> list[str]:
-    """C test programs of an area; the random ones last."""
+    """C test programs of an area; those that take seconds last."""
     found = sorted(
         {
             p.stem
             for pattern in area.tests
             for p in [*ROOT.glob(f"tests/c/{pattern}.c"), *ROOT.glob(f"tests/app/{pattern}.c")]
         },
-        key=lambda name: (name.endswith("_fuzz"), name),
+        key=lambda name: (name.endswith("_landing"), name.endswith("_fuzz"), name),
     )
     if not found:
         raise SystemExit(f"mutants: no test fits {area.tests}")

@@ -63,41 +63,41 @@ static double value_at(const uint8_t *data, const ivl_sil_field_t *f, uint32_t i
 
 // ---- packets
 
-#define GIVE_MEMBER(type, name, unit, doc) \
-    next++;                                \
+#define GIVE_MEMBER(type, name, unit, doc)                                                                                                 \
+    next++;                                                                                                                                \
     sent.name = (ivl_##type##_t)next;
 
-#define CHECK_MEMBER(kind, member, measure, text)           \
-    TEST_ASSERT_EQUAL_STRING(#member, fields[next].name);   \
-    TEST_ASSERT_EQUAL_UINT32(1u, fields[next].count);       \
-    TEST_ASSERT_EQUAL_INT(next + 1, (int)value_at(bytes, &fields[next], 0)); \
+#define CHECK_MEMBER(kind, member, measure, text)                                                                                          \
+    TEST_ASSERT_EQUAL_STRING(#member, fields[next].name);                                                                                  \
+    TEST_ASSERT_EQUAL_UINT32(1u, fields[next].count);                                                                                      \
+    TEST_ASSERT_EQUAL_INT(next + 1, (int)value_at(bytes, &fields[next], 0));                                                               \
     next++;
 
 /// Every member a number of its own, found where the layout says; nothing behind the packet is touched.
-#define CHECK_PACKET(lower, UPPER)                                                  \
-    do                                                                              \
-    {                                                                               \
-        int                  next = 0;                                              \
-        ivl_wire_##lower##_t sent;                                                  \
-        memset(&sent, 0, sizeof sent);                                              \
-        IVL_WIRE_##UPPER(GIVE_MEMBER) memset(bytes, GUARD, sizeof bytes);           \
-        const size_t size = ivl_wire_put_##lower(bytes, &sent);                     \
-        look_at(IVL_WIRE_TYPE_##UPPER);                                             \
-        TEST_ASSERT_EQUAL_INT(next, (int)n_fields);                                 \
-        TEST_ASSERT_EQUAL_UINT64(size, item_size);                                  \
-        next = 0;                                                                   \
-        IVL_WIRE_##UPPER(CHECK_MEMBER) TEST_ASSERT_EACH_EQUAL_HEX8(GUARD, bytes + size, GUARD_BYTES); \
-        struct                                                                      \
-        {                                                                           \
-            ivl_wire_##lower##_t packet;                                            \
-            uint8_t              guard[GUARD_BYTES];                                \
-        } got;                                                                      \
-        memset(&got, GUARD, sizeof got);                                            \
-        TEST_ASSERT_TRUE(ivl_wire_get_##lower(bytes, size, &got.packet));           \
-        TEST_ASSERT_EACH_EQUAL_HEX8(GUARD, got.guard, GUARD_BYTES);                 \
-        uint8_t again[IVL_WIRE_SIZE_MAX];                                           \
-        TEST_ASSERT_EQUAL_UINT64(size, ivl_wire_put_##lower(again, &got.packet));   \
-        TEST_ASSERT_EQUAL_MEMORY(bytes, again, size);                               \
+#define CHECK_PACKET(lower, UPPER)                                                                                                         \
+    do                                                                                                                                     \
+    {                                                                                                                                      \
+        int                  next = 0;                                                                                                     \
+        ivl_wire_##lower##_t sent;                                                                                                         \
+        memset(&sent, 0, sizeof sent);                                                                                                     \
+        IVL_WIRE_##UPPER(GIVE_MEMBER) memset(bytes, GUARD, sizeof bytes);                                                                  \
+        const size_t size = ivl_wire_put_##lower(bytes, &sent);                                                                            \
+        look_at(IVL_WIRE_TYPE_##UPPER);                                                                                                    \
+        TEST_ASSERT_EQUAL_INT(next, (int)n_fields);                                                                                        \
+        TEST_ASSERT_EQUAL_UINT64(size, item_size);                                                                                         \
+        next = 0;                                                                                                                          \
+        IVL_WIRE_##UPPER(CHECK_MEMBER) TEST_ASSERT_EACH_EQUAL_HEX8(GUARD, bytes + size, GUARD_BYTES);                                      \
+        struct                                                                                                                             \
+        {                                                                                                                                  \
+            ivl_wire_##lower##_t packet;                                                                                                   \
+            uint8_t              guard[GUARD_BYTES];                                                                                       \
+        } got;                                                                                                                             \
+        memset(&got, GUARD, sizeof got);                                                                                                   \
+        TEST_ASSERT_TRUE(ivl_wire_get_##lower(bytes, size, &got.packet));                                                                  \
+        TEST_ASSERT_EACH_EQUAL_HEX8(GUARD, got.guard, GUARD_BYTES);                                                                        \
+        uint8_t again[IVL_WIRE_SIZE_MAX];                                                                                                  \
+        TEST_ASSERT_EQUAL_UINT64(size, ivl_wire_put_##lower(again, &got.packet));                                                          \
+        TEST_ASSERT_EQUAL_MEMORY(bytes, again, size);                                                                                      \
     } while (0)
 
 static void test_packets_are_laid_out_as_they_are_written(void)
@@ -227,9 +227,13 @@ static void test_rules_are_those_of_the_guard_and_no_others(void)
     }
 }
 
-void setUp(void) {}
+void setUp(void)
+{
+}
 
-void tearDown(void) {}
+void tearDown(void)
+{
+}
 
 int main(void)
 {
