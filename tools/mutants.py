@@ -61,7 +61,7 @@ QUIET = ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
 MAKE = ["make", "--no-print-directory"]
 NATIVE = ["-f", "tools/native.mk", f"FLAVOUR={FLAVOUR}", "WARNINGS=-w", "CC=gcc"]
 APP = ["-f", "tools/app.mk", "CC=gcc -w"]
-APP_TEST = "build/app/test_app"
+APP_TESTS = {"test_app": ["build/app/test_app"], "sequences": ["build/app/sequences", "500"]}
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,14 @@ LEARNER_TESTS = ("learners", "ephe", "ephe_memory", "cma_learner", "gp", "bo", "
 AREAS = (
     Area("firmware core", ("firmware/core/ivl_*.c",), 130, 0.97, ("test_ivl_*",), ("ivl_guard.c", "ivl_wire.c")),
     Area("guard", ("firmware/core/ivl_guard.c",), 50, 0.97, ("test_ivl_*",)),
-    Area("app", ("firmware/app/app_*.c",), 60, 0.97, ("test_app", "test_cf_*"), ("app_port.c",)),
+    Area(
+        "app",
+        ("firmware/app/app_*.c",),
+        60,
+        0.97,
+        ("test_app", "sequences"),
+        ("app_port.c",),
+    ),
     Area(
         "wire",
         ("firmware/core/ivl_wire.c", "sim_sil/sil_wire.c"),
@@ -272,18 +279,12 @@ def copy_tree() -> None:
 
 
 def programs(area: Area) -> list[str]:
-    """C test programs of an area; those that take seconds last."""
-    found = sorted(
-        {
-            p.stem
-            for pattern in area.tests
-            for p in [*ROOT.glob(f"tests/c/{pattern}.c"), *ROOT.glob(f"tests/app/{pattern}.c")]
-        },
-        key=lambda name: (name.endswith("_landing"), name.endswith("_fuzz"), name),
-    )
+    """C test programs of an area; the random ones last."""
+    folders = ("tests/c", "tests/app", "tests/fuzz")
+    found = {p.stem for pattern in area.tests for folder in folders for p in ROOT.glob(f"{folder}/{pattern}.c")}
     if not found:
         raise SystemExit(f"mutants: no test fits {area.tests}")
-    return found
+    return sorted(found, key=lambda name: (name.endswith("_fuzz"), name))
 
 
 def in_order(tests: list[str], path: str, finders: Counter[tuple[str, str]]) -> list[str]:
@@ -292,14 +293,14 @@ def in_order(tests: list[str], path: str, finders: Counter[tuple[str, str]]) -> 
     return sorted(tests, key=lambda test: (stem not in test, -finders[path, Path(test).stem]))
 
 
-def program(test: str) -> str:
-    """The program of a C test, in the copy."""
-    return APP_TEST if test == "test_app" else f"build/{FLAVOUR}/{test}"
+def program(test: str) -> list[str]:
+    """The command that runs a C test in the copy."""
+    return APP_TESTS.get(test, [f"build/{FLAVOUR}/{test}"])
 
 
 def build(test: str) -> int:
     """Build a C test by its makefile."""
-    return run([*MAKE, *(APP if test == "test_app" else NATIVE), program(test)])
+    return run([*MAKE, *(APP if test in APP_TESTS else NATIVE), program(test)[0]])
 
 
 @functools.lru_cache(maxsize=1000)
@@ -316,8 +317,9 @@ def recipe(makefile: tuple[str, ...], path: str, targets: tuple[str, ...]) -> tu
 def recipes(area: Area, path: str) -> dict[str, tuple[list[str], list[Path]]]:
     """How a source is built again: into the libraries, and into the test of the app where that is asked."""
     found = {"libraries": recipe(tuple(NATIVE), path, tuple(LIBRARIES))}
-    if "test_app" in area.tests:
-        found["test_app"] = recipe(tuple(APP), path, (APP_TEST,))
+    for test in APP_TESTS:
+        if test in area.tests:
+            found[test] = recipe(tuple(APP), path, (program(test)[0],))
     return found
 
 
@@ -350,7 +352,7 @@ def try_c(area: Area, mutant: Mutant, limits: dict[str, int], finders: Counter[t
         for test in in_order(programs(area), mutant.path, finders):
             if test in how and not follow(how[test][0]):
                 return Verdict(mutant, NONE)
-            if run([program(test)], limits[test]) != 0:
+            if run(program(test), limits[test]) != 0:
                 return Verdict(mutant, FOUND, test)
         return Verdict(mutant, SURVIVED if is_other_code(mutant) else NONE)
 
@@ -437,7 +439,7 @@ def check_untouched(area: Area) -> dict[str, int]:
     for test in programs(area) if is_c else area.tests:
         is_built = not is_c or build(test) == 0
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        if not is_built or (run([program(test)]) if is_c else run_pytest(test)) != 0:
+        if not is_built or (run(program(test)) if is_c else run_pytest(test)) != 0:
             bad.append(test)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         took_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

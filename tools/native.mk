@@ -1,6 +1,7 @@
 # Compiles firmware core, simulator and C tests.  Called by the Makefile as
 #     make -f tools/native.mk FLAVOUR=<flavour> <target>
-# Targets: core, lib, sil, check, fuzz (flavour fuzz only).  Everything made is in build/<flavour>/.
+# Targets: core, lib, sil, check, sequences (random ones for the server's loop, SEQUENCES of them), fuzz (flavour fuzz only).  Everything made
+# is in build/<flavour>/.
 # Each source is compiled once per flavour; the library and the tests link the same objects.
 
 FLAVOUR ?= release
@@ -59,7 +60,7 @@ FLAGS_tests/c := $(FLAGS_unity) $(FLAGS_sim_sil) -Itests/c -Isim_sil/cf -Itests/
 # the link server, and a vehicle that only writes down what it is told, for its tests
 FLAGS_sim_sil/crtp := $(FLAGS_sim_sil)
 FLAGS_tests/crtp   := $(FLAGS_sim_sil)
-FLAGS_tests/fuzz   := $(FLAGS_vehicle)
+FLAGS_tests/fuzz   := $(FLAGS_vehicle) $(FLAGS_unity) -Itests/c
 
 # The fuzzer is guided by the server and the vehicle, not by the physics, which costs time and says little.  Comparisons are followed in the
 # server alone: the vehicle searches its tables by name when it starts.
@@ -98,9 +99,13 @@ TESTED_CF   := $(CF)
 TESTED_CRTP := $(CRTP)
 endif
 
+SEQUENCES ?= 300
+SEED      ?= 1
+TIMEOUT_S ?= 14400
+
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core lib sil check fuzz FORCE
+.PHONY: core lib sil check fuzz sequences FORCE
 
 core: $(CORE)
 
@@ -133,6 +138,16 @@ $(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/sim_sil/crtp/crtp_main.o
 	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -o $@ $(filter %.o,$^) $(LDLIBS)
 
 fuzz: $(BUILD)/fuzz_crtp
+
+sequences: $(BUILD)/loop_sequences
+	@timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED)
+	@if timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED) --traitor > $(BUILD)/loop_traitor.txt; then echo 'error: loop_sequences did not find the traitor' >&2; exit 1; fi
+	@grep -q 'a stranger' $(BUILD)/loop_traitor.txt || { cat $(BUILD)/loop_traitor.txt; exit 1; }
+
+# sockets and clock are the program's own
+$(BUILD)/loop_sequences: $(BUILD)/tests/fuzz/loop_sequences.o $(CORE) $(SIM) $(CF) $(filter-out %/crtp_udp.o,$(CRTP)) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -Wl,--wrap=clock_gettime -Wl,--wrap=ivl_crtp_step -o $@ $(filter %.o,$^) $(LDLIBS)
 
 $(BUILD)/fuzz_crtp: $(BUILD)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
@@ -197,4 +212,4 @@ $(BUILD)/flags.txt: FORCE
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(BUILD)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))

@@ -14,6 +14,7 @@ void app_boot(const ivl_cfg_t *cfg);
 void app_begin_anew(void);
 
 /// Whether an approach puts the vehicle on its path, as only a simulated one can be put: then it may be asked for without READY before it.
+/// A policy that flips at once belongs to such a landing: it does so no longer when the vehicle flies by itself.
 void app_start_on_path(bool yes);
 
 /// The stock controller has the motors, and nobody has asked for anything else.

@@ -977,6 +977,59 @@ static void test_one_packet_does_not_lead_from_idle_into_a_flip(void)
     TEST_ASSERT_EQUAL_UINT32(n_trigger + 1u, ivl_app.state.diag.n_trigger);
 }
 
+/// A set-point of no height and any thrust, however little, is somebody who wants to fly.
+static void test_the_least_thrust_of_a_setpoint_is_no_rest(void)
+{
+    start_in_flight();
+    sdk.setpoint.mode.z = modeDisable;
+    const struct
+    {
+        float thrust;
+        bool  is_idle;
+    } ROWS[] = {{0.0f, true}, {1.0e-6f, false}, {0.5f, false}, {1.0f, false}, {65535.0f, false}};
+    for (size_t i = 0; i < sizeof ROWS / sizeof ROWS[0]; i++)
+    {
+        sdk.setpoint.thrust = ROWS[i].thrust;
+        sdk_double_run(1);
+        TEST_ASSERT_EQUAL_INT(ROWS[i].is_idle, ivl_app.in.vitals.stock_idle);
+    }
+    sdk.setpoint.thrust = 0.0f;
+    sdk.setpoint.mode.z = modeAbs;
+    sdk_double_run(1);
+    TEST_ASSERT_FALSE(ivl_app.in.vitals.stock_idle);
+}
+
+static void test_a_packet_of_any_length_is_counted_if_it_is_none(void)
+{
+    start();
+    sdk.n_receive_left = 10;
+    for (size_t size = 1; size <= 5u; size++)
+    {
+        const uint32_t before = ivl_app.n_bad_packet;
+        memset(sdk.incoming.bytes, 0x7f, sizeof sdk.incoming.bytes);
+        sdk.incoming.size = size;
+        app_task_once();
+        TEST_ASSERT_EQUAL_UINT32(before + 1u, ivl_app.n_bad_packet);
+    }
+    const uint32_t before = ivl_app.n_bad_packet;
+    app_task_once();
+    TEST_ASSERT_EQUAL_UINT32(before, ivl_app.n_bad_packet);
+}
+
+/// The stabilizer takes what waits in its next call: a millisecond, and the answer goes out.
+static void test_the_task_comes_back_after_a_millisecond_when_something_waits(void)
+{
+    start();
+    sdk.n_receive_left = 10;
+    const ivl_wire_policy_t packet = constant_packet(8, 5.0f, 0.006f);
+    sdk.incoming.size = ivl_wire_put_policy(sdk.incoming.bytes, &packet);
+    app_task_once();
+    TEST_ASSERT_TRUE(app_packets_waiting(&ivl_app));
+    const uint64_t before_us = sdk.now_us;
+    app_task_once();
+    TEST_ASSERT_EQUAL_UINT64(before_us + 1000u, sdk.now_us);
+}
+
 static void test_packets_arrive_through_the_task(void)
 {
     start();
@@ -1112,6 +1165,9 @@ int main(void)
     RUN_TEST(test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat);
     RUN_TEST(test_command_that_was_overtaken_is_not_obeyed_unless_it_stops);
     RUN_TEST(test_one_packet_does_not_lead_from_idle_into_a_flip);
+    RUN_TEST(test_the_least_thrust_of_a_setpoint_is_no_rest);
+    RUN_TEST(test_a_packet_of_any_length_is_counted_if_it_is_none);
+    RUN_TEST(test_the_task_comes_back_after_a_millisecond_when_something_waits);
     RUN_TEST(test_packets_arrive_through_the_task);
     RUN_TEST(test_noise_on_the_channel_starts_no_motor_and_breaks_nothing);
     return UNITY_END();
