@@ -990,12 +990,12 @@ static void test_the_least_thrust_of_a_setpoint_is_no_rest(void)
     for (size_t i = 0; i < sizeof ROWS / sizeof ROWS[0]; i++)
     {
         sdk.setpoint.thrust = ROWS[i].thrust;
-        sdk_double_run(1);
+        sdk_double_run(4);
         TEST_ASSERT_EQUAL_INT(ROWS[i].is_idle, ivl_app.in.vitals.stock_idle);
     }
     sdk.setpoint.thrust = 0.0f;
     sdk.setpoint.mode.z = modeAbs;
-    sdk_double_run(1);
+    sdk_double_run(4);
     TEST_ASSERT_FALSE(ivl_app.in.vitals.stock_idle);
 }
 
