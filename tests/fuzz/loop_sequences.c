@@ -285,7 +285,7 @@ static bool motors_turn(void)
     bool turn = false;
     for (int i = 0; i < 4; i++)
     {
-        turn = turn || (ivl_cf_the.motor_N[i] != 0.0f);
+        turn = turn || (ivl_cf_the.motor_N[i] > 0.0f);
         must((ivl_cf_the.motor_N[i] >= 0.0f) && isfinite(ivl_cf_the.motor_N[i]), "a motor's command is none");
     }
     return turn;

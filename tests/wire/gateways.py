@@ -1,6 +1,7 @@
 """Two gateways on a bus between clients and a vehicle, in one thread, with a clock that a test turns."""
 
 import errno
+import functools
 import heapq
 import itertools
 from collections import deque
@@ -118,11 +119,11 @@ class Gateways:
             for end, gateway in enumerate((self.host, self.far)):
                 arriving = self.buses[end].arriving
                 for _ in range(len(arriving)):
-                    self.inside(end, lambda g=gateway, frame=arriving.popleft(): g.on_frame(frame))
+                    self.inside(end, functools.partial(gateway.on_frame, arriving.popleft()))
             if self.clock.now_s >= self._next_tick_s:
                 self._next_tick_s += TICK_S
                 for end, gateway in enumerate((self.host, self.far)):
-                    self.inside(end, lambda g=gateway: self._tick(g))
+                    self.inside(end, functools.partial(self._tick, gateway))
             self.clock.advance(STEP_S)
 
     def _tick(self, gateway: Any) -> None:
