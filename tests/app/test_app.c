@@ -344,6 +344,7 @@ static void test_core_takes_over_and_gives_back_without_a_step(void)
     TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, HOVER_THRUST / 65535.0f, last);
     // and back: the stock controller starts anew, with all its loops at once
     const int n_null = sdk.n_pid_null;
+    sdk.null_pid_step = 77;
     ivl_app.command_in.value.request = IVL_REQUEST_IDLE;
     atomic_store(&ivl_app.command_in.full, true);
     for (int i = 0; i < 400; i++)
@@ -356,6 +357,7 @@ static void test_core_takes_over_and_gives_back_without_a_step(void)
         if (was_core && !is_core)
         {
             TEST_ASSERT_EQUAL_UINT32(0, sdk.last_pid_step);
+            TEST_ASSERT_EQUAL_UINT32(0, sdk.null_pid_step);
         }
         last = now;
     }
@@ -977,6 +979,65 @@ static void test_one_packet_does_not_lead_from_idle_into_a_flip(void)
     TEST_ASSERT_EQUAL_UINT32(n_trigger + 1u, ivl_app.state.diag.n_trigger);
 }
 
+static void test_a_firmware_that_does_not_say_whether_motors_are_driven_past_the_controller_counts_as_if_they_were(void)
+{
+    start();
+    sdk.n_receive_left = 10;
+    app_task_once();
+    TEST_ASSERT_FALSE(atomic_load(&ivl_app.motors_bypassed));
+    sdk.has_no_motor_power_set = true;
+    app_task_start();
+    app_task_once();
+    TEST_ASSERT_TRUE(atomic_load(&ivl_app.motors_bypassed));
+}
+
+/// The stock controller had 5 % more thrust: what is left of that is added in an abort, too.
+static void test_thrust_fades_on_when_an_abort_follows_at_once(void)
+{
+    start_ready();
+    TEST_ASSERT_EQUAL_UINT8(IVL_PHASE_ABORTED, send_command(IVL_REQUEST_ABORT).phase);
+    sdk_double_run(4);
+    assert_phase(IVL_PHASE_ABORTED);
+    TEST_ASSERT_TRUE(fabsf(sdk.control.normalizedForces[0] - app_norm_of_N(ivl_app.out.thrust_N[0])) > 1.0e-3f);
+}
+
+static void test_the_attitude_is_the_estimators_while_the_vehicle_is_idle(void)
+{
+    start();
+    sdk_double_run(10);
+    sdk.state.attitudeQuaternion.x = 0.1f;
+    sdk.state.attitudeQuaternion.y = -0.2f;
+    sdk.state.attitudeQuaternion.z = 0.3f;
+    sdk.state.attitudeQuaternion.w = sqrtf(1.0f - 0.14f);
+    sdk_double_run(4);
+    assert_phase(IVL_PHASE_IDLE);
+    const ivl_quat_t expected = app_q_WB(&sdk.state), q_WB = ivl_app.senses.attitude.q_WB;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 1.0f, fabsf(q_WB.x * expected.x + q_WB.y * expected.y + q_WB.z * expected.z + q_WB.w * expected.w));
+}
+
+/// Each commit has the whole time that a controller may take, whatever became of the one before.
+static void test_the_time_of_a_commit_begins_with_it(void)
+{
+    start();
+    sdk_double_write_u32("commit", 1);
+    sdk_double_run(4);
+    ivl_app.n_config_polls = 7;
+    app_packets_poll(&ivl_app);
+    TEST_ASSERT_EQUAL_INT(0, ivl_app.n_config_polls);
+    sdk.controller_runs = false;
+    for (uint32_t seq = 2; seq <= 3u; seq++)
+    {
+        int n = 0;
+        sdk.n_sent = 0;
+        for (sdk_double_write_u32("commit", seq); (sdk.n_sent == 0) && (n < 100); n++)
+        {
+            app_packets_poll(&ivl_app);
+        }
+        TEST_ASSERT_EQUAL_INT(21, n);
+        TEST_ASSERT_EQUAL_INT(0, ivl_app.n_config_polls);
+    }
+}
+
 /// A set-point of no height and any thrust, however little, is somebody who wants to fly.
 static void test_the_least_thrust_of_a_setpoint_is_no_rest(void)
 {
@@ -1165,6 +1226,10 @@ int main(void)
     RUN_TEST(test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat);
     RUN_TEST(test_command_that_was_overtaken_is_not_obeyed_unless_it_stops);
     RUN_TEST(test_one_packet_does_not_lead_from_idle_into_a_flip);
+    RUN_TEST(test_a_firmware_that_does_not_say_whether_motors_are_driven_past_the_controller_counts_as_if_they_were);
+    RUN_TEST(test_thrust_fades_on_when_an_abort_follows_at_once);
+    RUN_TEST(test_the_attitude_is_the_estimators_while_the_vehicle_is_idle);
+    RUN_TEST(test_the_time_of_a_commit_begins_with_it);
     RUN_TEST(test_the_least_thrust_of_a_setpoint_is_no_rest);
     RUN_TEST(test_a_packet_of_any_length_is_counted_if_it_is_none);
     RUN_TEST(test_the_task_comes_back_after_a_millisecond_when_something_waits);
