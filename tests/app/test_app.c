@@ -73,6 +73,8 @@ static ivl_wire_policy_echo_t send_part(const ivl_wire_policy_t *packet)
     ivl_wire_policy_echo_t echo = {0};
     TEST_ASSERT_TRUE(ivl_wire_get_policy_echo(last_sent()->bytes, last_sent()->size, &echo));
     TEST_ASSERT_EQUAL_UINT32(packet->seq, echo.seq);
+    // only a policy of several parts lacks any
+    TEST_ASSERT_TRUE((packet->n > IVL_WIRE_THETAS) || (echo.missing == 0u));
     return echo;
 }
 
@@ -991,6 +993,58 @@ static void test_a_firmware_that_does_not_say_whether_motors_are_driven_past_the
     TEST_ASSERT_TRUE(atomic_load(&ivl_app.motors_bypassed));
 }
 
+/// The least certain axis counts, whichever it is.
+static void test_the_position_is_as_uncertain_as_its_least_certain_axis(void)
+{
+    start();
+    sdk.n_receive_left = 10;
+    for (char axis = 'X'; axis <= 'Z'; axis++)
+    {
+        sdk.variance_m2 = 0.04f;
+        sdk.certain_axis = axis;
+        app_task_once();
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.2f, atomic_load(&ivl_app.p_sigma_m));
+    }
+    for (char axis = 'X'; axis <= 'Z'; axis++)
+    {
+        // one that is no number is seen
+        sdk.variance_m2 = NAN;
+        sdk.certain_axis = axis;
+        app_task_once();
+        TEST_ASSERT_TRUE(isnan(atomic_load(&ivl_app.p_sigma_m)));
+    }
+}
+
+static void test_a_configuration_stays_when_the_controller_is_selected_again(void)
+{
+    start();
+    sdk_double_write_float("host_s_max", 1.5f);
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(1).status);
+    controllerOutOfTreeInit();
+    TEST_ASSERT_FLOAT_WITHIN(0.0f, 1.5f, ivl_app.cfg.host_s_max);
+}
+
+/// Who had the motors when another controller was selected has them when the app's is selected again.
+static void test_a_controller_that_is_selected_again_fades_from_whoever_had_the_motors(void)
+{
+    start_in_flight();
+    controllerOutOfTreeInit();
+    TEST_ASSERT_EQUAL_INT(APP_OWNER_STOCK, ivl_app.owner);
+    start_ready();
+    controllerOutOfTreeInit();
+    TEST_ASSERT_EQUAL_INT(APP_OWNER_CORE, ivl_app.owner);
+}
+
+/// In flight, too, what is told first is what is wrong with it.
+static void test_the_first_row_of_a_configuration_is_refused_as_any_other(void)
+{
+    start_ready();
+    sdk_double_write_float(ivl_cfg_name(0), NAN);
+    const ivl_wire_config_echo_t echo = commit(2);
+    TEST_ASSERT_EQUAL_INT(IVL_ERR_RANGE, echo.status);
+    TEST_ASSERT_EQUAL_UINT8(0, echo.bad);
+}
+
 /// The stock controller had 5 % more thrust: what is left of that is added in an abort, too.
 static void test_thrust_fades_on_when_an_abort_follows_at_once(void)
 {
@@ -1227,6 +1281,10 @@ int main(void)
     RUN_TEST(test_command_that_was_overtaken_is_not_obeyed_unless_it_stops);
     RUN_TEST(test_one_packet_does_not_lead_from_idle_into_a_flip);
     RUN_TEST(test_a_firmware_that_does_not_say_whether_motors_are_driven_past_the_controller_counts_as_if_they_were);
+    RUN_TEST(test_the_position_is_as_uncertain_as_its_least_certain_axis);
+    RUN_TEST(test_a_configuration_stays_when_the_controller_is_selected_again);
+    RUN_TEST(test_the_first_row_of_a_configuration_is_refused_as_any_other);
+    RUN_TEST(test_a_controller_that_is_selected_again_fades_from_whoever_had_the_motors);
     RUN_TEST(test_thrust_fades_on_when_an_abort_follows_at_once);
     RUN_TEST(test_the_attitude_is_the_estimators_while_the_vehicle_is_idle);
     RUN_TEST(test_the_time_of_a_commit_begins_with_it);
