@@ -27,7 +27,7 @@ FloatArray = npt.NDArray[np.float64]
 
 TIMING_S, MOMENT = 0.010, 0.10
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-_N_RREV, _N_MOMENT, _N_NEAR = 57, 12, 60
+_N_RREV, _N_MOMENT, _N_NEAR = 57, 12, 30
 _LEAST_AHEAD_S = 1e-3
 _N_FIRST, _HOPELESS = 16, 0.01
 """A first look with so many particles leaves out the policies whose rate is below this."""
