@@ -44,6 +44,8 @@ _ROWS_MAX = 1000
 _NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 40, 0.3
 _BATCH, _RATE = 400, 1e-3
 
+Rows = npt.NDArray[Any]
+"""Rows of numbers in single or double precision, shape (n, ...)."""
 Net = Sequence[tuple[FloatArray, FloatArray]]
 """Weights and biases of the layers of a network."""
 
@@ -118,8 +120,8 @@ class RecordingEmulator:
         return _in_parts(self._mean, z, theta, conditions)
 
     def _mean(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
-        u = np.concatenate([z, self.scale(theta, conditions)], axis=1, dtype=np.float32)
-        expected = np.asarray(_terms(u, theta.shape[1]) @ self.weights.astype(np.float32), dtype=np.float64)
+        u: Rows = np.concatenate([z, self.scale(theta, conditions)], axis=1, dtype=np.float32)
+        expected: Rows = (_terms(u, theta.shape[1]) @ self.weights.astype(np.float32)).astype(np.float64)
         return expected + self.spread * forward(self.net, u) if self.net else expected
 
 
@@ -129,9 +131,9 @@ def _in_parts(function: Callable[..., FloatArray], *rows: FloatArray) -> FloatAr
     return np.concatenate([function(*(array[first : first + _ROWS_MAX] for array in rows)) for first in firsts])
 
 
-def forward(net: Net, u: FloatArray) -> FloatArray:
+def forward(net: Net, u: Rows) -> FloatArray:
     """Output of a network with rectifiers, in single precision, shape (n, n_out)."""
-    h: npt.NDArray[Any] = np.asarray(u, dtype=np.float32)
+    h: Rows = np.asarray(u, dtype=np.float32)
     for number, (weight, bias) in enumerate(net):
         h = h @ weight
         h += bias
@@ -146,7 +148,7 @@ def _layers(net: Any) -> Net:
     return [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in pairs]
 
 
-def _terms(u: npt.NDArray[Any], dim: int) -> npt.NDArray[Any]:
+def _terms(u: Rows, dim: int) -> Rows:
     """One, all of u, all products of two, and the cubes of policy and conditions, the last of u; dim of the policy.
 
     Shape (n, n_terms), of the type of u; a column lies in one piece of memory, since columns are multiplied.
