@@ -93,6 +93,21 @@ def test_a_recording_is_the_motion_after_the_trigger_up_to_the_contact(kin: Fami
     assert np.array_equal(features, again, equal_nan=True)
 
 
+def test_only_the_swing_after_the_contact_tells_soft_legs_from_stiff_ones(kin: Family) -> None:
+    soft, stiff = (kin.world.changed(**{"leg.stiffness": factor * 0.08}) for factor in (0.7, 1.3))
+    means = [
+        np.mean(
+            [recording.simulated(world, FLIGHT, np.array([4.5, 8.0]), seed=3, stream=k)[0] for k in range(8)], axis=0
+        )
+        for world in (soft, stiff)
+    ]
+    apart = dict(zip(recording.NAMES, np.abs(means[0] - means[1]), strict=True))
+    assert apart["swing_rate_020"] > 4.0  # rad/s; equal flights scatter by 3
+    before = [apart[name] for name in apart if name.startswith(recording.SIGNALS) and np.isfinite(apart[name])]
+    assert len(before) > 20
+    assert max(before) < 0.05  # degrees, rad/s, m
+
+
 def test_a_flight_without_a_trigger_records_nothing(kin: Family) -> None:
     never = Flight(0.5, 20.0, "constant", "imparted", BOUNDS)
     features, outcome = recording.simulated(kin.world, never, np.array([20.0, 5.0]), seed=3, stream=0)
