@@ -21,6 +21,7 @@ from ivl.belief.simulator import Simulator
 from ivl.family import Family, FamilyChoice, Spread
 from ivl.learners import EpheBelief, make_learner
 from ivl.learners.base import LANDED, RECORDING
+from ivl.learners.ephe import imagine
 from ivl.outcome import four_leg
 from ivl.plots import belief as belief_picture
 from ivl.report import learn_page
@@ -394,9 +395,10 @@ def test_the_safest_policy_lies_inside_the_window() -> None:
 
 def test_ephe_on_imagined_rollouts_converges_into_the_window() -> None:
     mu, sigma = np.array([5.0, 5.0]), np.array([1.5, 1.5])
-    rng = np.random.default_rng(2)
+    rng, floor = np.random.default_rng(2), np.array([0.05, 0.05])
+    reward = decide.imagined(Window(), NOTHING, BOUNDS, rng)  # type: ignore[arg-type]
     for _ in range(4):
-        mu, sigma = decide.ephe(Window(), NOTHING, mu, sigma, BOUNDS, rng, 300, 10, 0.7, np.array([0.05, 0.05]))  # type: ignore[arg-type]
+        mu, sigma = imagine(reward, mu, sigma, BOUNDS, rng, 300, 10, 0.7, floor)
     assert 3.9 < mu[0] < 4.3
     assert mu[1] > 7.0
     assert sigma[0] < 0.4
