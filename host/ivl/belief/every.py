@@ -97,6 +97,6 @@ def imagined(
         moment = rng.uniform(-decide.MOMENT, decide.MOMENT, len(at))
         flown = decide.perturbed(flights[..., :2], late, moment, box[:2])
         whole = np.concatenate([flown, flights[..., 2:]], axis=-1)
-        return belief.rate_of_one(whole.reshape(-1, 4)).reshape(len(theta), -1).mean(axis=1)
+        return np.asarray(belief.rate_of_one(whole.reshape(-1, 4)).reshape(len(theta), -1).mean(axis=1))
 
     return reward

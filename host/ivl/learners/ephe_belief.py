@@ -181,8 +181,8 @@ class EpheBelief(EpheMemory):
         options, floor = self.options, self.options.floor * self.sigma0
         starts = [(mu, np.maximum(sigma, 0.5 * self.sigma0)), (self._choice, 0.5 * self.sigma0)]
         reward = decide.imagined(self._belief, self._corrected, self._bounds, self._rng)
-        sizes = options.n_imagined, options.iterations, options.shrink_min
-        found = [imagine(reward, *start, self._bounds, self._rng, *sizes, floor) for start in starts]
+        n, updates, shrink = options.n_imagined, options.iterations, options.shrink_min
+        found = [imagine(reward, *start, self._bounds, self._rng, n, updates, shrink, floor) for start in starts]
         rates = decide.margin_rate(self._belief, self._corrected, np.array([mu for mu, _ in found]), self._bounds)
         return found[int(rates.argmax())]
 
