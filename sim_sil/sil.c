@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "sim_width.h"
 #include "world_hover.h"
 #include "world_replay.h"
 #include "world_rollout.h"
@@ -103,6 +104,11 @@ _Static_assert(sizeof TABLES / sizeof TABLES[0] == IVL_SIL_TABLE_COUNT, "one tab
 int ivl_sil_abi_version(void)
 {
     return IVL_SIL_ABI_VERSION;
+}
+
+int ivl_sil_register_bits(int bits)
+{
+    return ivl_sim_width_use(bits) ? 64 * ivl_sim_width_lanes() : -1;
 }
 
 const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *item_size)
@@ -224,7 +230,7 @@ static void *fly_batch(void *argument)
 static int thread_count(int asked, size_t n)
 {
     long         threads = (asked > 0) ? asked : sysconf(_SC_NPROCESSORS_ONLN);
-    const size_t groups = (n + IVL_SIM_LANES - 1) / IVL_SIM_LANES;
+    const size_t lanes = (size_t)ivl_sim_width_lanes(), groups = (n + lanes - 1) / lanes;
     threads = (threads < 1) ? 1 : ((threads > THREADS_MAX) ? THREADS_MAX : threads);
     return ((size_t)threads > groups) ? (int)((groups > 0) ? groups : 1) : (int)threads;
 }

@@ -37,10 +37,15 @@ typedef enum
 
 enum
 {
-    IVL_SIL_ABI_VERSION = 2
+    IVL_SIL_ABI_VERSION = 3
 };
 
 int ivl_sil_abi_version(void);
+
+/// Chooses the registers in which rollouts stand side by side; their bits do not depend on it.  Holds for every thread of the process.
+/// @param[in] bits  128, 256 or 512; 0: the widest that the machine has, as at the start
+/// @return their width, -1 with nothing changed if the machine has none of this width
+int ivl_sil_register_bits(int bits);
 
 /// Fields of a table, NULL if there is no such table.
 const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *item_size);

@@ -20,8 +20,9 @@ import numpy.typing as npt
 
 from ivl.errors import NativeError
 
-ABI_VERSION = 2
+ABI_VERSION = 3
 LIBRARY_ENV = "IVL_NATIVE_LIBRARY"  # another build of the library, for example one with sanitizers
+REGISTER_BITS_ENV = "IVL_REGISTER_BITS"  # width of the registers in which rollouts stand side by side
 DEFAULT_LIBRARY = Path(__file__).parent / "_native" / "libivl_sil.so"
 
 TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED = range(5)
@@ -96,6 +97,8 @@ class NativeLibrary:
                 f"{path}: interface version {version}, this package needs {ABI_VERSION}: run `make build`"
             )
         self.path = path
+        if asked := os.environ.get(REGISTER_BITS_ENV):
+            self.use_registers(asked)
         self.params: Mapping[str, Field] = {f.name: f for f in self._fields(TABLE_PARAM)[0]}
         self.spec_fields, self.spec_dtype = self._table(TABLE_SPEC)
         self.outcome_fields, self.outcome_dtype = self._table(TABLE_OUTCOME)
@@ -120,6 +123,23 @@ class NativeLibrary:
         """Fields of a packet of the app channel, by its type, or of a record of the vehicle (`LAYOUT_...`)."""
         fields, item_size = self._fields(code, "ivl_sil_layout")
         return {f.name: f for f in fields}, _dtype(fields if item_size else (), item_size)
+
+    def use_registers(self, bits: int | str = 0) -> int:
+        """Choose the width of the registers in which rollouts stand side by side; outcomes do not depend on it.
+
+        Args:
+            bits: 128, 256 or 512; 0: the widest that this machine has.
+
+        Returns:
+            The width in use from now on, in every thread.
+
+        Raises:
+            NativeError: This machine has no such registers; nothing is changed.
+        """
+        width = int(self._c.ivl_sil_register_bits(int(bits))) if str(bits).isdecimal() else -1
+        if width < 0:
+            raise NativeError(f"registers of {bits} bits: this machine has none of this width (128, 256 or 512; 0: the widest)")
+        return width
 
     def wire_version(self) -> int:
         """Version that the second byte of each packet of the app channel has."""
@@ -373,6 +393,7 @@ def _declare(c: Any) -> None:
     for name, restype, argtypes in (
         ("ivl_sil_table", ctypes.POINTER(_CField), (c_int, u32p, u32p)),
         ("ivl_sil_abi_version", c_int, ()),
+        ("ivl_sil_register_bits", c_int, (c_int,)),
         ("ivl_sil_model_create", ptr, (ptr, ctypes.c_char_p, size)),
         ("ivl_sil_model_free", None, (ptr,)),
         ("ivl_sil_model_derived", None, (ptr, ptr)),

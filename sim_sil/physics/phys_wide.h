@@ -19,13 +19,19 @@
 #define IVL_SIM_UNROLL _Pragma("GCC unroll 16")
 #endif
 
-enum
-{
-    IVL_SIM_LANES = 8  ///< rollouts that are stepped together; a power of two
-};
+/// Rollouts that are stepped together, one in each double of a register; a power of two.  Physics and world are compiled once for each width
+/// of registers that a machine may have (tools/native.mk); everything else sees the narrowest, which every machine has.
+#if !defined(IVL_SIM_LANES)
+#define IVL_SIM_LANES 2
+#endif
 
-/// One number of each of several rollouts.  Every operation acts on each lane alone, so a lane's bits do not depend on its
-/// neighbours, and the same source serves registers of any width.
+/// A function of which there is one for each width: sim_width.h chooses among them.
+#define IVL_SIM_OF_WIDTH(name)         IVL_SIM_WITH_LANES(name, IVL_SIM_LANES)
+#define IVL_SIM_WITH_LANES(name, n)    IVL_SIM_WITH_LANES_(name, n)
+#define IVL_SIM_WITH_LANES_(name, n)   name##_lanes##n
+
+/// One number of each of several rollouts, in one register.  Every operation acts on each lane alone, and rounds alike in registers of any
+/// width (there is no fused multiply-add), so a lane's bits depend neither on its neighbours nor on the width.
 typedef double  ivl_wide_t __attribute__((vector_size(sizeof(double) * IVL_SIM_LANES)));
 typedef int64_t ivl_mask_t __attribute__((vector_size(sizeof(int64_t) * IVL_SIM_LANES)));  ///< comparison: all bits set, or none
 

@@ -62,7 +62,7 @@ static bool goes_on(ivl_sim_group_t *group, int lane, double period_s, size_t n_
     return true;
 }
 
-void ivl_sim_hover(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n, double period_s, size_t n_rows)
+void IVL_SIM_OF_WIDTH(ivl_sim_hover)(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n, double period_s, size_t n_rows)
 {
     ivl_sim_group_t group;
     seat_t          seat[IVL_SIM_LANES];

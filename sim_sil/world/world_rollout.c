@@ -426,7 +426,7 @@ static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t sou
     }
 }
 
-void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
+void IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
 {
     ivl_sim_group_t group;
     ivl_sim_job_t   job[IVL_SIM_LANES];

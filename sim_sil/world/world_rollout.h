@@ -137,6 +137,7 @@ typedef bool (*ivl_sim_source_t)(void *context, ivl_sim_job_t *job);
 
 /// Flies all landings of a source, several at a time.  Each outcome depends on its spec alone.
 void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
+void IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
 
 // The parts of ivl_sim_fly, for a world that goes on before and after its landings.
 
