@@ -34,6 +34,7 @@
 /// width (there is no fused multiply-add), so a lane's bits depend neither on its neighbours nor on the width.
 typedef double  ivl_wide_t __attribute__((vector_size(sizeof(double) * IVL_SIM_LANES)));
 typedef int64_t ivl_mask_t __attribute__((vector_size(sizeof(int64_t) * IVL_SIM_LANES)));  ///< comparison: all bits set, or none
+typedef ivl_mask_t ivl_whole_t;                                                             ///< whole numbers: a mask is 0 or -1 in each lane
 
 /// The same number in all lanes.
 IVL_SIM_INLINE ivl_wide_t ivl_wide(double a)
@@ -59,6 +60,44 @@ IVL_SIM_INLINE ivl_wide_t ivl_wide_select(ivl_mask_t m, ivl_wide_t yes, ivl_wide
 IVL_SIM_INLINE ivl_wide_t ivl_wide_abs(ivl_wide_t a)
 {
     return (ivl_wide_t)((ivl_mask_t)a & 0x7fffffffffffffffLL);
+}
+
+/// The smaller of two numbers; b unless a < b.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_smaller(ivl_wide_t a, ivl_wide_t b)
+{
+    return ivl_wide_select(a < b, a, b);
+}
+
+/// The larger of two numbers; b unless a > b.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_larger(ivl_wide_t a, ivl_wide_t b)
+{
+    return ivl_wide_select(a > b, a, b);
+}
+
+/// Nearest whole number of |a| < 2^51: so large a number is added that no digits are left for the rest.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_nearest(ivl_wide_t a)
+{
+    return (a + 6755399441055744.0) - 6755399441055744.0;
+}
+
+/// Largest whole number that is not above a, |a| < 2^51.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_floor(ivl_wide_t a)
+{
+    const ivl_wide_t near = ivl_wide_nearest(a);
+    return near - ivl_wide_select(near > a, ivl_wide(1.0), ivl_wide(0.0));
+}
+
+/// Smallest whole number that is not below a, |a| < 2^51.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_ceil(ivl_wide_t a)
+{
+    const ivl_wide_t near = ivl_wide_nearest(a);
+    return near + ivl_wide_select(near < a, ivl_wide(1.0), ivl_wide(0.0));
+}
+
+/// The same answer in all lanes.
+IVL_SIM_INLINE ivl_mask_t ivl_mask(bool yes)
+{
+    return (ivl_mask_t){0} - (yes ? 1 : 0);
 }
 
 IVL_SIM_INLINE bool ivl_mask_any(ivl_mask_t m)

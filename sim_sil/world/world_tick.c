@@ -2,10 +2,10 @@
 
 #include "world_step_size.h"
 
-static void set_due(ivl_sim_world_t *w, double span_s)
+static void set_due(ivl_sim_group_t *group, int lane, double span_s)
 {
-    w->left_s = span_s;
-    w->evaluations_left = ivl_sim_step_evaluations(&w->model->step, span_s);
+    group->progress.left_s[lane] = span_s;
+    group->progress.evaluations_left[lane] = ivl_sim_step_evaluations(&group->model->step, span_s);
 }
 
 static void body_of(const ivl_sim_state_t *s, int lane, ivl_sim_kin_t *kin)
@@ -38,18 +38,19 @@ void ivl_sim_world_tick(ivl_sim_group_t *group, int lane)
     ivl_sim_world_t       *w = &group->world[lane];
     const ivl_sim_model_t *model = w->model;
     // time is a count of ticks, so that it does not drift
-    w->t_s = (double)w->n_tick * model->tick_s;
+    const double t_s = (double)w->n_tick * model->tick_s;
+    group->progress.t_s[lane] = t_s;
     w->n_tick++;
-    set_due(w, (double)w->n_tick * model->tick_s - w->t_s);
+    set_due(group, lane, (double)w->n_tick * model->tick_s - t_s);
     if (model->core.every_tick || !ivl_motors_latched_off(&w->firmware))
     {
         ivl_sim_kin_t kin;  // of which sensors need the body's part
         body_of(&group->state, lane, &kin);
-        ivl_sim_scene_t scene = {.model = model, .kin = &kin, .surface_height_m = ivl_sim_world_surface_m(w, w->t_s)};
+        ivl_sim_scene_t scene = {.model = model, .kin = &kin, .surface_height_m = ivl_sim_world_surface_m(group, lane)};
         ivl_d3_store(scene.a_W_mps2, ivl_w3_lane(&group->last.a_WB_mps2, lane));
-        ivl_sim_sensors_read(&scene, &w->rng, w->t_s, &w->sensors, &w->in);
+        ivl_sim_sensors_read(&scene, &w->rng, t_s, &w->sensors, &w->in);
         fly(group, lane);
-        ivl_sim_rotor_command(model, &w->rotor, w->out.thrust_N);
+        ivl_sim_rotor_command(model, &group->rotor, lane, w->out.thrust_N);
         const bool approaches = w->firmware.phase == IVL_PHASE_APPROACH;
         w->n_approach_tick += approaches ? 1 : 0;
         w->n_valid_tick += (approaches && w->out.ceiling.valid) ? 1 : 0;

@@ -205,7 +205,7 @@ static void check_missed(const ivl_sim_model_t *model, const ivl_sim_spec_t *spe
     w->in.cmd = (ivl_command_t){.request = IVL_REQUEST_APPROACH, .speed_mps = (float)V, .angle_rad = (float)angle};
     const ivl_policy_t policy = ivl_sim_policy(spec->form[0], spec->theta, false);
     TEST_ASSERT_EQUAL(IVL_OK, ivl_policy_commit(&model->firmware, &w->firmware, &policy));
-    while (w->t_s < o.t_trigger_s[0] + model->raw.end_missed_time_s)
+    while (group.progress.t_s[0] < o.t_trigger_s[0] + model->raw.end_missed_time_s)
     {
         ivl_sim_world_tick(&group, 0);
         while (!ivl_sim_world_ready(&group, 0))
