@@ -24,7 +24,8 @@ WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-prom
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
 
 # no contraction: the same source gives the same bits on every machine and compiler, whatever its instructions
-CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPIC -pthread \
+# the flight core also in halves, for vehicles side by side
+CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -DIVL_SIDE_BY_SIDE -fno-math-errno -fPIC -pthread \
           -Ifirmware/core -Isim_sil -Isim_sil/physics -Isim_sil/world
 LDLIBS := -lm -pthread
 

@@ -109,18 +109,6 @@ static ivl_reference_t reference(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_d
     return (ivl_reference_t){.p_W_m = state->p_hold_W_m};
 }
 
-static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, const ivl_seen_t *seen, float thrust_N[4])
-{
-    if (what == IVL_DRIVE_FLIP)
-    {
-        ivl_maneuver_thrusts(cfg, state->snapshot.action.moment_Nm, thrust_N);
-        return;
-    }
-    const ivl_reference_t ref = reference(cfg, state, what, seen);
-    const ivl_wrench_t    wrench = ivl_controller_compute(cfg, &state->sense.sample, &ref, state->derived.tan_tilt_cmd_max);
-    ivl_mixer_thrusts(cfg, &wrench, thrust_N);
-}
-
 // sensed state -> contact, distance -> cues -> phase (the trigger is one of its conditions)
 static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_seen_t *seen)
 {
@@ -140,7 +128,13 @@ static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in,
     ivl_phase_update(cfg, state, seen);
 }
 
-void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
+#ifdef IVL_SIDE_BY_SIDE
+#define HALF
+#else
+#define HALF static
+#endif
+
+HALF bool ivl_step_decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_reference_t *ref)
 {
     state->diag.n_tick++;
     ivl_seen_t seen = {.cues = {.valid = false}};
@@ -150,13 +144,33 @@ void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_
         decide(cfg, state, in, &seen);
     }
 
-    // phase -> thrusts -> PWM
     rest(state, &seen, out);
     const ivl_drive_t what = ivl_phase_drive(state);
-    if (what != IVL_DRIVE_OFF)
+    if (what == IVL_DRIVE_OFF)
     {
-        out->motors_on = true;
-        drive(cfg, state, what, &seen, out->thrust_N);
+        return false;
+    }
+    out->motors_on = true;
+    if (what == IVL_DRIVE_FLIP)
+    {
+        ivl_maneuver_thrusts(cfg, state->snapshot.action.moment_Nm, out->thrust_N);
+        return false;
+    }
+    *ref = reference(cfg, state, what, &seen);
+    return true;
+}
+
+// phase -> thrusts -> PWM
+void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
+{
+    ivl_reference_t ref;
+    if (ivl_step_decide(cfg, state, in, out, &ref))
+    {
+        const ivl_wrench_t wrench = ivl_controller_compute(cfg, &state->sense.sample, &ref, state->derived.tan_tilt_cmd_max);
+        ivl_mixer_thrusts(cfg, &wrench, out->thrust_N);
+    }
+    if (out->motors_on)
+    {
         ivl_pwm_of_thrust(cfg, out->thrust_N, out->pwm);
         const ivl_wrench_t made = ivl_mixer_wrench(cfg, out->thrust_N);
         out->pitch_moment_Nm = made.moment_B_Nm.y;

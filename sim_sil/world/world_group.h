@@ -11,6 +11,7 @@
 #include "phys_rotor.h"
 #include "phys_state.h"
 #include "sim_autopilot.h"
+#include "world_drive.h"
 #include "world_sensors.h"
 
 enum
@@ -92,6 +93,7 @@ typedef struct
     ivl_sim_rotors_t       rotor;
     ivl_sim_progress_t     progress;
     ivl_sim_touch_t        touch;
+    ivl_sim_drive_t        drive;
     bool                   active[IVL_SIM_LANES];
     ivl_sim_world_t        world[IVL_SIM_LANES];
 } ivl_sim_group_t;
@@ -142,7 +144,10 @@ double ivl_sim_world_gap_m(const ivl_sim_group_t *group, int lane);
 /// State of motion of one vehicle.
 ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane);
 
-/// A tick of the flight core (skipped while its motors are latched off); the motion until the next one is then due.
+/// A tick of the flight core (skipped while its motors are latched off) in each lane in which one is due; the motion until the next one then is.
+void ivl_sim_world_ticks(ivl_sim_group_t *group, const bool due[IVL_SIM_LANES]);
+
+/// The same for one lane.
 void ivl_sim_world_tick(ivl_sim_group_t *group, int lane);
 
 /// True when the motion that was due is done: the next tick can begin.

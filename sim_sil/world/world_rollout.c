@@ -357,12 +357,6 @@ void ivl_sim_rollout_note(const ivl_sim_group_t *group, int lane, ivl_sim_outcom
     }
 }
 
-static void tick(ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
-{
-    ivl_sim_world_tick(group, lane);
-    ivl_sim_rollout_note(group, lane, o);
-}
-
 bool ivl_sim_rollout_ended(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
 {
     ivl_sim_end_t end;
@@ -388,7 +382,7 @@ bool ivl_sim_spec_good(const ivl_sim_spec_t *spec)
     return good;
 }
 
-/// Puts the next landing of the source into a lane; the lane stays empty if there is none.
+/// Puts the next landing of the source into a lane, whose first tick is then due; the lane stays empty if there is none.
 static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
 {
     group->active[lane] = false;
@@ -403,7 +397,6 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
         else if (ivl_sim_rollout_start(group, lane, job->spec))
         {
             trace(job->tracer, group, lane);
-            tick(group, lane, job->outcome);
         }
         else
         {
@@ -414,7 +407,7 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
     }
 }
 
-/// What happens between two ticks.
+/// What happens between two ticks, of which the second is then due if there is a landing in the lane.
 static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
 {
     trace(job->tracer, group, lane);
@@ -422,9 +415,17 @@ static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t sou
     {
         refill(group, lane, source, context, job);
     }
-    else
+}
+
+static void tick(ivl_sim_group_t *group, const bool due[IVL_SIM_LANES], const ivl_sim_job_t job[IVL_SIM_LANES])
+{
+    ivl_sim_world_ticks(group, due);
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        tick(group, lane, job->outcome);
+        if (due[lane])
+        {
+            ivl_sim_rollout_note(group, lane, job[lane].outcome);
+        }
     }
 }
 
@@ -432,24 +433,28 @@ void IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_sim_source_
 {
     ivl_sim_group_t group;
     ivl_sim_job_t   job[IVL_SIM_LANES];
-    bool            any = false;
+    bool            due[IVL_SIM_LANES], any = false;
     ivl_sim_group_init(model, &group);
     group.port = model->core.open(model->core.context);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
         refill(&group, lane, source, context, &job[lane]);
-        any = any || group.active[lane];
+        due[lane] = group.active[lane];
+        any = any || due[lane];
     }
     while (any)
     {
+        tick(&group, due, job);
         // ends: a tick takes a bounded number of steps, time counts ticks, and a landing ends by its time at the latest
         ivl_sim_group_step(&group);
         any = false;
         for (int lane = 0; lane < IVL_SIM_LANES; lane++)
         {
-            if (group.active[lane] && ivl_sim_world_ready(&group, lane))
+            due[lane] = group.active[lane] && ivl_sim_world_ready(&group, lane);
+            if (due[lane])
             {
                 between_ticks(&group, lane, source, context, &job[lane]);
+                due[lane] = group.active[lane];
             }
             any = any || group.active[lane];
         }
