@@ -4,7 +4,7 @@
 
 #include "world_hover.h"
 
-typedef void (*fly_t)(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
+typedef ivl_sim_work_t (*fly_t)(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
 typedef void (*hover_t)(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n, double period_s, size_t n_rows);
 
 typedef struct
@@ -27,9 +27,9 @@ enum
 #endif
 
 #define DECLARE(n)                                                                                                                         \
-    void ivl_sim_fly_lanes##n(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);                                       \
-    void ivl_sim_hover_lanes##n(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n_flight, double period_s,            \
-                                size_t n_rows);
+    ivl_sim_work_t ivl_sim_fly_lanes##n(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);                             \
+    void           ivl_sim_hover_lanes##n(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n_flight, double period_s,  \
+                                          size_t n_rows);
 WIDTHS(DECLARE)
 
 #define ROW(n) {n, ivl_sim_fly_lanes##n, ivl_sim_hover_lanes##n},
@@ -89,9 +89,9 @@ bool ivl_sim_width_use(int bits)
     return known;
 }
 
-void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
+ivl_sim_work_t ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
 {
-    chosen()->fly(model, source, context);
+    return chosen()->fly(model, source, context);
 }
 
 void ivl_sim_hover(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n, double period_s, size_t n_rows)

@@ -1,6 +1,7 @@
 """Compare the bits of reference landings across compilers, optimisation levels, register widths and thread counts.
 
-Each library given is loaded in processes of their own and flies the same landings, in registers of every width that this machine has. What they computed must be equal, and
+Each library given is loaded in processes of their own and flies the same landings, in registers of every width that
+this machine has. What they computed must be equal, and
 equal to the reference in tests/golden/landings.txt, which changes with the physics: in its own commit, with the reason.
 
 usage: golden.py [--update] LIBRARY...

@@ -22,7 +22,7 @@ static ivl_vec3_t feedback(const ivl_cfg_t *cfg, ivl_vec3_t e, ivl_vec3_t e_rate
 // no more lift than four motors have, then no more tilt than allowed: height goes before horizontal position
 static ivl_vec3_t limited(const ivl_cfg_t *cfg, ivl_vec3_t force_W_N, float tan_tilt_max)
 {
-    const float weight_N = cfg->mass_kg * cfg->gravity_mps2;
+    const float     weight_N = cfg->mass_kg * cfg->gravity_mps2;
     const ivl_num_t lift_N = ivl_clamp(force_W_N.z, ivl_num(IVL_LIFT_NORM_MIN * weight_N), ivl_num(4.0f * cfg->motor_thrust_N_max));
     const ivl_num_t side_N_max = tan_tilt_max * lift_N;
     const ivl_num_t side_N = ivl_root(force_W_N.x * force_W_N.x + force_W_N.y * force_W_N.y);

@@ -11,7 +11,7 @@
 typedef float ivl_num_t;
 
 /// A constant as a number.
-#define ivl_num(x) (x)
+#define ivl_num(x)                   (x)
 
 /// One of two numbers.  Which of them are computed is not said: both must be harmless.
 #define ivl_pick(condition, yes, no) ((condition) ? (yes) : (no))

@@ -109,6 +109,18 @@ static ivl_reference_t reference(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_d
     return (ivl_reference_t){.p_W_m = state->p_hold_W_m};
 }
 
+static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, const ivl_seen_t *seen, float thrust_N[4])
+{
+    if (what == IVL_DRIVE_FLIP)
+    {
+        ivl_maneuver_thrusts(cfg, state->snapshot.action.moment_Nm, thrust_N);
+        return;
+    }
+    const ivl_reference_t ref = reference(cfg, state, what, seen);
+    const ivl_wrench_t    wrench = ivl_controller_compute(cfg, &state->sense.sample, &ref, state->derived.tan_tilt_cmd_max);
+    ivl_mixer_thrusts(cfg, &wrench, thrust_N);
+}
+
 // sensed state -> contact, distance -> cues -> phase (the trigger is one of its conditions)
 static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_seen_t *seen)
 {
@@ -128,52 +140,50 @@ static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in,
     ivl_phase_update(cfg, state, seen);
 }
 
-#ifdef IVL_SIDE_BY_SIDE
-#define HALF
-#else
-#define HALF static
-#endif
-
-HALF bool ivl_step_decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_reference_t *ref)
+// all of a tick but the thrusts
+static ivl_drive_t begin(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_seen_t *seen)
 {
     state->diag.n_tick++;
-    ivl_seen_t seen = {.cues = {.valid = false}};
     // a finished landing only waits for the end of its request cycle
     if ((state->phase != IVL_PHASE_DONE) || (in->cmd.request == IVL_REQUEST_IDLE))
     {
-        decide(cfg, state, in, &seen);
+        decide(cfg, state, in, seen);
     }
-
-    rest(state, &seen, out);
-    const ivl_drive_t what = ivl_phase_drive(state);
-    if (what == IVL_DRIVE_OFF)
-    {
-        return false;
-    }
-    out->motors_on = true;
-    if (what == IVL_DRIVE_FLIP)
-    {
-        ivl_maneuver_thrusts(cfg, state->snapshot.action.moment_Nm, out->thrust_N);
-        return false;
-    }
-    *ref = reference(cfg, state, what, &seen);
-    return true;
+    rest(state, seen, out);
+    return ivl_phase_drive(state);
 }
 
-// phase -> thrusts -> PWM
 void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
 {
-    ivl_reference_t ref;
-    if (ivl_step_decide(cfg, state, in, out, &ref))
+    ivl_seen_t        seen = {.cues = {.valid = false}};
+    const ivl_drive_t what = begin(cfg, state, in, out, &seen);
+    // phase -> thrusts -> PWM
+    if (what != IVL_DRIVE_OFF)
     {
-        const ivl_wrench_t wrench = ivl_controller_compute(cfg, &state->sense.sample, &ref, state->derived.tan_tilt_cmd_max);
-        ivl_mixer_thrusts(cfg, &wrench, out->thrust_N);
-    }
-    if (out->motors_on)
-    {
+        out->motors_on = true;
+        drive(cfg, state, what, &seen, out->thrust_N);
         ivl_pwm_of_thrust(cfg, out->thrust_N, out->pwm);
         const ivl_wrench_t made = ivl_mixer_wrench(cfg, out->thrust_N);
         out->pitch_moment_Nm = made.moment_B_Nm.y;
         out->thrust_total_N = made.thrust_N;
     }
 }
+
+#ifdef IVL_SIDE_BY_SIDE
+bool ivl_step_decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_reference_t *ref)
+{
+    ivl_seen_t        seen = {.cues = {.valid = false}};
+    const ivl_drive_t what = begin(cfg, state, in, out, &seen);
+    const bool        follows = (what != IVL_DRIVE_OFF) && (what != IVL_DRIVE_FLIP);
+    out->motors_on = what != IVL_DRIVE_OFF;
+    if (follows)
+    {
+        *ref = reference(cfg, state, what, &seen);
+    }
+    else if (out->motors_on)
+    {
+        ivl_maneuver_thrusts(cfg, state->snapshot.action.moment_Nm, out->thrust_N);
+    }
+    return follows;
+}
+#endif

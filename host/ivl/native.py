@@ -136,10 +136,16 @@ class NativeLibrary:
         Raises:
             NativeError: This machine has no such registers; nothing is changed.
         """
-        width = int(self._c.ivl_sil_register_bits(int(bits))) if str(bits).isdecimal() else -1
-        if width < 0:
-            raise NativeError(f"registers of {bits} bits: this machine has none of this width (128, 256 or 512; 0: the widest)")
+        width = int(self._c.ivl_sil_register_bits(int(bits))) if str(bits).isdecimal() else 0
+        if width == 0:
+            raise NativeError(
+                f"no registers of {bits} bits here (128, 256 or 512, if the machine has them; 0: the widest)"
+            )
         return width
+
+    def register_bits(self) -> int:
+        """Width of the registers in use."""
+        return int(self._c.ivl_sil_register_bits(-1))
 
     def wire_version(self) -> int:
         """Version that the second byte of each packet of the app channel has."""
@@ -317,13 +323,18 @@ class NativeModel:
 
     def rollouts(self, specs: npt.NDArray[np.void], n_threads: int) -> npt.NDArray[np.void]:
         """Fly `specs` (1-D, `spec_dtype`); returns the outcomes in the same order, same bits for any `n_threads`."""
+        return self.rollouts_and_occupancy(specs, n_threads)[0]
+
+    def rollouts_and_occupancy(self, specs: npt.NDArray[np.void], n_threads: int) -> tuple[npt.NDArray[np.void], float]:
+        """The same, and the share of the lanes' evaluations that the landings asked for."""
+        work = np.zeros(2, dtype=np.uint64)
         outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
         status = self._library._c.ivl_sil_rollouts(
-            self._handle, _pointer(specs), specs.size, n_threads, _pointer(outcomes)
+            self._handle, _pointer(specs), specs.size, n_threads, _pointer(outcomes), _pointer(work)
         )
         if status != 0:
             raise NativeError(f"the native batch of {specs.size} rollouts failed with status {status}")
-        return outcomes
+        return outcomes, float(work[1]) / float(work[0]) if work[0] else 1.0
 
     def trace(self, spec: npt.NDArray[np.void], period_s: float) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """Fly one spec and record it every `period_s`; returns (rows, outcome of shape (1,))."""
@@ -399,7 +410,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_model_derived", None, (ptr, ptr)),
         ("ivl_sil_model_surface", None, (ptr, ptr)),
         ("ivl_sil_surface_forward", None, (ptr, ptr)),
-        ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
+        ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_replay", c_int, (ptr, ptr, c_int, ptr, ptr, size, ptr)),
         ("ivl_sil_form", ctypes.c_uint32, (c_int, textp, textp)),

@@ -28,46 +28,52 @@ void ivl_sim_rotor_set(ivl_sim_rotors_t *rotors, int lane, const double radps[IV
     }
 }
 
-double ivl_sim_rotor_voltage(const ivl_sim_model_t *model, const ivl_sim_rotors_t *rotors, int lane)
+/// Voltages under the present load, 0 for an empty battery.
+IVL_SIM_INLINE ivl_wide_t voltages(const ivl_sim_model_t *model, const ivl_sim_rotors_t *rotors)
 {
-    double square = 0.0;
+    ivl_wide_t square = ivl_wide(0.0);
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
-        square += rotors->speed_radps[i][lane] * rotors->speed_radps[i][lane];
+        square += rotors->speed_radps[i] * rotors->speed_radps[i];
     }
-    const double voltage = rotors->open_circuit_V[lane] - model->raw.battery_sag_VpN * model->raw.rotor_thrust_constant_Ns2 * square;
-    return (voltage > 0.0) ? voltage : 0.0;
+    const ivl_wide_t voltage = rotors->open_circuit_V - model->raw.battery_sag_VpN * model->raw.rotor_thrust_constant_Ns2 * square;
+    return ivl_wide_larger(voltage, ivl_wide(0.0));
+}
+
+double ivl_sim_rotor_voltage(const ivl_sim_model_t *model, const ivl_sim_rotors_t *rotors, int lane)
+{
+    return voltages(model, rotors)[lane];
 }
 
 /// Speed of a rotor at its present voltage / its speed at the rated voltage, at equal duty cycle.    [MODEL eq. 2.7]
-static double speed_scale(const ivl_sim_model_t *model, const ivl_sim_rotors_t *rotors, int lane)
+IVL_SIM_INLINE ivl_wide_t speed_scale(const ivl_sim_model_t *model, const ivl_sim_rotors_t *rotors)
 {
     const ivl_sim_params_t *raw = &model->raw;
-    const double            excess = ivl_sim_rotor_voltage(model, rotors, lane) / raw->battery_rated_voltage_V - 1.0;
-    const double            scale = 1.0 + raw->battery_speed_slope_norm * excess;
-    return (scale > 0.0) ? scale : 0.0;
+    const ivl_wide_t        excess = voltages(model, rotors) / raw->battery_rated_voltage_V - 1.0;
+    return ivl_wide_larger(1.0 + raw->battery_speed_slope_norm * excess, ivl_wide(0.0));
 }
 
-void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotors_t *rotors, int lane, const float thrust_N[4])
+void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotors_t *rotors, const ivl_mask_t *which, const ivl_wide_t thrust_N[4])
 {
     const ivl_sim_params_t *raw = &model->raw;
-    const bool              sags = rotors->open_circuit_V[lane] > 0.0;
-    const double            scale = sags ? speed_scale(model, rotors, lane) : 1.0;
-    const double            full = scale * model->rotor_speed_max_radps;
+    const ivl_wide_t        none = ivl_wide(0.0), most = ivl_wide(raw->rotor_thrust_max_N);
+    const ivl_mask_t        sags = rotors->open_circuit_V > 0.0;
+    const bool              any_sags = ivl_mask_any(*which & sags);
+    const ivl_wide_t        scale = any_sags ? speed_scale(model, rotors) : ivl_wide(1.0);
+    const ivl_wide_t        full = scale * model->rotor_speed_max_radps;
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
-        const double asked = raw->rotor_thrust_gain_norm * (double)thrust_N[i], most = raw->rotor_thrust_max_N;
-        const double thrust = (asked > 0.0) ? ((asked < most) ? asked : most) : 0.0;
-        const double speed = sqrt(thrust / raw->rotor_thrust_constant_Ns2);
-        if (!sags)
+        const ivl_wide_t asked = raw->rotor_thrust_gain_norm * thrust_N[i];
+        const ivl_wide_t thrust = ivl_wide_select(asked > none, ivl_wide_smaller(asked, most), none);
+        ivl_wide_t       speed = ivl_wide_sqrt(thrust / raw->rotor_thrust_constant_Ns2);
+        if (any_sags)
         {
-            rotors->command_radps[i][lane] = speed;
-            continue;
+            // the autopilot's map from thrust to duty cycle holds at the rated voltage; with compensation at any, up to full duty
+            const ivl_wide_t open_loop = scale * speed;
+            const ivl_wide_t delivered = open_loop + raw->battery_compensated_norm * (speed - open_loop);
+            speed = ivl_wide_select(sags, ivl_wide_smaller(delivered, full), speed);
         }
-        // the autopilot's map from thrust to duty cycle holds at the rated voltage; with compensation at any, up to full duty
-        const double open_loop = scale * speed;
-        const double delivered = open_loop + raw->battery_compensated_norm * (speed - open_loop);
-        rotors->command_radps[i][lane] = (delivered < full) ? delivered : full;
+        rotors->command_radps[i] = ivl_wide_select(*which, speed, rotors->command_radps[i]);
     }
 }
 
@@ -117,8 +123,8 @@ IVL_SIM_INLINE ivl_wide_t spin(const ivl_sim_model_t *model, const fade_t *f, iv
     const ivl_mask_t arrived = ivl_wide_abs(gap) < SPEED_TOLERANCE_RADPS, slows = gap > 0.0;
     const ivl_wide_t decay = ivl_wide_select(gap < 0.0, f->decay_up, f->decay_down);
     const ivl_wide_t share = ivl_wide_select(gap < 0.0, f->share_up, f->share_down);
-    ivl_wide_t       square = command * command + 2.0 * command * gap * share * (1.0 - decay) + 0.5 * gap * gap * share * (1.0 - decay * decay);
-    ivl_wide_t       after = command + gap * decay;
+    ivl_wide_t square = command * command + 2.0 * command * gap * share * (1.0 - decay) + 0.5 * gap * gap * share * (1.0 - decay * decay);
+    ivl_wide_t after = command + gap * decay;
     if (model->raw.rotor_drag_share_norm > 0.0 && ivl_mask_any(slows))
     {
         ivl_wide_t       slowed;

@@ -28,9 +28,9 @@ void ivl_sim_rotor_init(const ivl_sim_model_t *model, ivl_sim_rotors_t *rotors, 
 /// The same speeds, and commands, in one lane.
 void ivl_sim_rotor_set(ivl_sim_rotors_t *rotors, int lane, const double radps[IVL_SIM_MOTORS]);
 
-/// New thrust commands of one vehicle, N per motor; beyond [0, thrust_max] they saturate.  The battery's present voltage scales what comes of
-/// them.                                                                                         [MODEL eq. 2.6 - 2.8]
-void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotors_t *rotors, int lane, const float thrust_N[4]);
+/// New thrust commands in the lanes that `which` names, N per motor; beyond [0, thrust_max] they saturate.  The battery's present voltage scales
+/// what comes of them.                                                                            [MODEL eq. 2.6 - 2.8]
+void ivl_sim_rotor_command(const ivl_sim_model_t *model, ivl_sim_rotors_t *rotors, const ivl_mask_t *which, const ivl_wide_t thrust_N[4]);
 
 /// Voltage under the load of the present rotor speeds, V; 0 for a supply that never sags.         [MODEL eq. 2.6]
 double ivl_sim_rotor_voltage(const ivl_sim_model_t *model, const ivl_sim_rotors_t *rotors, int lane);

@@ -38,7 +38,8 @@ IVL_SIM_INLINE ivl_wide_t foot_gap(const ivl_sim_model_t *model, const ivl_sim_s
     return surface_m - ivl_sim_surface_heights_of(&model->surface, s->p_foot_W_m[i]) - model->raw.leg_foot_radius_m;
 }
 
-ivl_mask_t world_gaps(const ivl_sim_group_t *group, const ivl_sim_state_t *s, ivl_wide_t t_s, ivl_mask_t which, ivl_wide_t gap[IVL_SIM_GAPS])
+ivl_mask_t world_gaps(const ivl_sim_group_t *group, const ivl_sim_state_t *s, ivl_wide_t t_s, ivl_mask_t which,
+                      ivl_wide_t gap[IVL_SIM_GAPS])
 {
     const ivl_sim_model_t   *model = group->model;
     const ivl_sim_surface_t *surface = &model->surface;

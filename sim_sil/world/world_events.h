@@ -15,7 +15,8 @@ ivl_wide_t world_surface_m(const ivl_sim_group_t *group, ivl_wide_t t_s);
 /// @param[in] which     lanes that are looked at
 /// @param[in,out] gap   of these lanes
 /// @return those of them that are not far from the surface
-ivl_mask_t world_gaps(const ivl_sim_group_t *group, const ivl_sim_state_t *s, ivl_wide_t t_s, ivl_mask_t which, ivl_wide_t gap[IVL_SIM_GAPS]);
+ivl_mask_t world_gaps(const ivl_sim_group_t *group, const ivl_sim_state_t *s, ivl_wide_t t_s, ivl_mask_t which,
+                      ivl_wide_t gap[IVL_SIM_GAPS]);
 
 /// Share of the tried step after which the earliest event happens, from the gaps before and after it.
 /// @param[in] which  lanes that are looked at; the others have no event

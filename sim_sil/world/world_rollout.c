@@ -408,11 +408,13 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
 }
 
 /// What happens between two ticks, of which the second is then due if there is a landing in the lane.
-static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
+static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job,
+                          ivl_sim_work_t *work)
 {
     trace(job->tracer, group, lane);
     if (ivl_sim_rollout_ended(group, lane, job->outcome))
     {
+        work->used += (uint64_t)group->progress.n_evaluation[lane];
         refill(group, lane, source, context, job);
     }
 }
@@ -429,11 +431,12 @@ static void tick(ivl_sim_group_t *group, const bool due[IVL_SIM_LANES], const iv
     }
 }
 
-void IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
+ivl_sim_work_t IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
 {
     ivl_sim_group_t group;
     ivl_sim_job_t   job[IVL_SIM_LANES];
     bool            due[IVL_SIM_LANES], any = false;
+    ivl_sim_work_t  work = {0, 0};
     ivl_sim_group_init(model, &group);
     group.port = model->core.open(model->core.context);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
@@ -447,17 +450,19 @@ void IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_sim_source_
         tick(&group, due, job);
         // ends: a tick takes a bounded number of steps, time counts ticks, and a landing ends by its time at the latest
         ivl_sim_group_step(&group);
+        work.offered += IVL_SIM_LANES;
         any = false;
         for (int lane = 0; lane < IVL_SIM_LANES; lane++)
         {
             due[lane] = group.active[lane] && ivl_sim_world_ready(&group, lane);
             if (due[lane])
             {
-                between_ticks(&group, lane, source, context, &job[lane]);
+                between_ticks(&group, lane, source, context, &job[lane], &work);
                 due[lane] = group.active[lane];
             }
             any = any || group.active[lane];
         }
     }
     model->core.close(group.port);
+    return work;
 }

@@ -105,7 +105,8 @@ double ivl_sim_world_surface_m(const ivl_sim_group_t *group, int lane)
 
 double ivl_sim_world_gap_m(const ivl_sim_group_t *group, int lane)
 {
-    return ivl_sim_world_surface_m(group, lane) - ivl_sim_surface_height_of(&group->model->surface, ivl_w3_lane(&group->state.p_WB_m, lane));
+    return ivl_sim_world_surface_m(group, lane) -
+           ivl_sim_surface_height_of(&group->model->surface, ivl_w3_lane(&group->state.p_WB_m, lane));
 }
 
 ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane)

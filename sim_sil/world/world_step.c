@@ -69,18 +69,22 @@ static ivl_mask_t judge(ivl_sim_group_t *group, ivl_mask_t moving, ivl_mask_t di
     return moving & ~jumped & ~again;
 }
 
+// A body that turns faster than this, or is farther away, moves no more as anything does.
+static const double RATE_MOST_RADPS = 1.0e6, FAR_MOST_M = 1.0e6;
+
 /// Of each lane.
 static ivl_mask_t all_diverged(const ivl_sim_state_t *s)
 {
     const ivl_w3_t   w = s->w_B_radps, p = s->p_WB_m;
     const ivl_wide_t rate_radps = ivl_wide_abs(w.x) + ivl_wide_abs(w.y) + ivl_wide_abs(w.z);
     const ivl_wide_t far_m = ivl_wide_abs(p.x) + ivl_wide_abs(p.y) + ivl_wide_abs(p.z);
-    return ~((rate_radps < 1.0e6) & (far_m < 1.0e6));
+    return ~((rate_radps < RATE_MOST_RADPS) & (far_m < FAR_MOST_M));
 }
 
 bool ivl_sim_world_diverged(const ivl_sim_state_t *s, int lane)
 {
-    return all_diverged(s)[lane] != 0;
+    const ivl_d3_t w = ivl_w3_lane(&s->w_B_radps, lane), p = ivl_w3_lane(&s->p_WB_m, lane);
+    return !(fabs(w.x) + fabs(w.y) + fabs(w.z) < RATE_MOST_RADPS && fabs(p.x) + fabs(p.y) + fabs(p.z) < FAR_MOST_M);
 }
 
 /// @param[in] moved  lanes whose step stands, and took time
@@ -92,7 +96,8 @@ static void accept(ivl_sim_group_t *group, ivl_mask_t moved, ivl_mask_t diverged
     {
         group->rotor.speed_radps[i] = ivl_wide_select(turned, progress->rotor.speed_radps[i], group->rotor.speed_radps[i]);
     }
-    const ivl_wide_t left = ivl_wide_select(diverged, ivl_wide(0.0), progress->left_s - progress->dt_s);  // the tick ends, and with it the landing
+    const ivl_wide_t left =
+        ivl_wide_select(diverged, ivl_wide(0.0), progress->left_s - progress->dt_s);  // the tick ends, and with it the landing
     progress->t_s = ivl_wide_select(moved, progress->t_s + progress->dt_s, progress->t_s);
     progress->left_s = ivl_wide_select(moved, left, progress->left_s);
     progress->n_step -= moved;

@@ -58,7 +58,8 @@ static bool decide(ivl_sim_group_t *group, int lane, ivl_reference_t *ref)
 }
 
 /// What follows from the thrusts of the flight core.
-static void drive_motors(ivl_sim_group_t *group, int lane)
+/// @param[out] thrust_N  of this lane
+static void drive_motors(ivl_sim_group_t *group, int lane, ivl_wide_t thrust_N[IVL_SIM_MOTORS])
 {
     ivl_sim_world_t       *w = &group->world[lane];
     const ivl_sim_model_t *model = w->model;
@@ -66,7 +67,10 @@ static void drive_motors(ivl_sim_group_t *group, int lane)
     {
         ivl_sim_autopilot_drive(model, &w->out);
     }
-    ivl_sim_rotor_command(model, &group->rotor, lane, w->out.thrust_N);
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        thrust_N[i][lane] = (double)w->out.thrust_N[i];
+    }
     const bool approaches = w->firmware.phase == IVL_PHASE_APPROACH;
     w->n_approach_tick += approaches ? 1 : 0;
     w->n_valid_tick += (approaches && w->out.ceiling.valid) ? 1 : 0;
@@ -86,17 +90,18 @@ void ivl_sim_world_ticks(ivl_sim_group_t *group, const bool due[IVL_SIM_LANES])
 {
     const ivl_sim_model_t *model = group->model;
     ivl_sim_drive_t       *drive = &group->drive;
-    bool                   steps[IVL_SIM_LANES], follows[IVL_SIM_LANES], any = false;
+    bool                   follows[IVL_SIM_LANES], any = false;
+    ivl_mask_t             steps = {0};
+    ivl_wide_t             thrust_N[IVL_SIM_MOTORS] = {{0.0}};
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
         ivl_sim_world_t *w = &group->world[lane];
         ivl_reference_t  ref;
-        steps[lane] = false;
         follows[lane] = false;
         if (due[lane])
         {
             begin_tick(group, lane);
-            steps[lane] = model->core.every_tick || !ivl_motors_latched_off(&w->firmware);
+            steps[lane] = (model->core.every_tick || !ivl_motors_latched_off(&w->firmware)) ? -1 : 0;
         }
         if (steps[lane] && decide(group, lane, &ref))
         {
@@ -118,8 +123,12 @@ void ivl_sim_world_ticks(ivl_sim_group_t *group, const bool due[IVL_SIM_LANES])
         }
         if (steps[lane])
         {
-            drive_motors(group, lane);
+            drive_motors(group, lane, thrust_N);
         }
+    }
+    if (ivl_mask_any(steps))
+    {
+        ivl_sim_rotor_command(model, &group->rotor, &steps, thrust_N);
     }
 }
 

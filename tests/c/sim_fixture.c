@@ -149,6 +149,18 @@ void stop_rotors(ivl_sim_group_t *group, int lane)
     ivl_sim_rotor_set(&group->rotor, lane, still);
 }
 
+void command_rotors(ivl_sim_group_t *group, const float thrust_N[IVL_SIM_MOTORS])
+{
+    ivl_mask_t which = {0};
+    ivl_wide_t thrust[IVL_SIM_MOTORS] = {{0.0}};
+    which[0] = -1;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        thrust[i][0] = (double)thrust_N[i];
+    }
+    ivl_sim_rotor_command(group->model, &group->rotor, &which, thrust);
+}
+
 void place_alone(const ivl_sim_model_t *model, ivl_sim_group_t *group, const ivl_sim_kin_t *kin, const ivl_sim_foot_t held[IVL_SIM_LEGS])
 {
     const ivl_sim_rng_t rng = {1, 2};

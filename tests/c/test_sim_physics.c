@@ -128,7 +128,7 @@ static void test_yaw_torque_turns_the_body_against_the_rotors(void)
     const double legs = 4.0 * (params.leg_mass_kg * 0.04 * 0.04);  // about: rods from 24 to 62 mm off the axis
     ivl_sim_group_init(&model, &group);
     ivl_sim_world_start(&group, 0, &rng, p, v);
-    ivl_sim_rotor_command(&model, &group.rotor, 0, command);
+    command_rotors(&group, command);
     advance_ticks(50);
     const double expected = -4.0 * 0.01 * 0.00612 / (params.body_inertia_zz_kgm2 + legs) * 0.1;
     TEST_ASSERT_DOUBLE_WITHIN(0.25 * fabs(expected), expected, ivl_sim_world_kin(&group, 0).w_B_radps[2]);

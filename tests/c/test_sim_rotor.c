@@ -44,10 +44,10 @@ static thrust_t step(const ivl_sim_model_t *model, ivl_sim_rotors_t *rotors, dou
 
 static void command_all(const ivl_sim_model_t *model, ivl_sim_rotors_t *rotors, const float thrust_N[4])
 {
-    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
-    {
-        ivl_sim_rotor_command(model, rotors, lane, thrust_N);
-    }
+    const ivl_mask_t all = ivl_mask(true);
+    const ivl_wide_t thrust[4] = {ivl_wide((double)thrust_N[0]), ivl_wide((double)thrust_N[1]), ivl_wide((double)thrust_N[2]),
+                                  ivl_wide((double)thrust_N[3])};
+    ivl_sim_rotor_command(model, rotors, &all, thrust);
 }
 
 static ivl_sim_rotors_t hovering(const ivl_sim_model_t *model)
@@ -71,7 +71,7 @@ static ivl_sim_params_t slow_params(void)
 
 static ivl_sim_rotors_t rotor_at(const ivl_sim_model_t *model, double speed_radps, float thrust_N)
 {
-    const float     command[4] = {thrust_N, thrust_N, thrust_N, thrust_N};
+    const float      command[4] = {thrust_N, thrust_N, thrust_N, thrust_N};
     ivl_sim_rotors_t rotor = hovering(model);
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
@@ -87,7 +87,7 @@ static void check_step(double start_radps, float thrust_N, double tau_s)
     const ivl_sim_params_t params = slow_params();
     const ivl_sim_model_t  model = fixture_model(&params);
     const double           command = sqrt((double)thrust_N / params.rotor_thrust_constant_Ns2);
-    ivl_sim_rotors_t        rotor = rotor_at(&model, start_radps, thrust_N);
+    ivl_sim_rotors_t       rotor = rotor_at(&model, start_radps, thrust_N);
     draws_t                draws = {3};
     double                 t = 0.0;
     while (t < 0.5)
@@ -119,10 +119,10 @@ static void test_mean_thrust_is_exact_for_any_step_and_any_division_of_it(void)
     for (int k = 0; k < 2; k++)
     {
         // integral of speed^2 over [0, T], by hand: command^2 T + 2 command gap tau (1 - e) + gap^2 tau (1 - e^2) / 2
-        const double    T = 0.08, tau = k ? params.rotor_tau_down_s : params.rotor_tau_up_s, e = exp(-T / tau);
-        const double    command = sqrt((double)0.06f / params.rotor_thrust_constant_Ns2), gap = starts[k] - command;
-        const double    integral = command * command * T + 2.0 * command * gap * tau * (1.0 - e) + 0.5 * gap * gap * tau * (1.0 - e * e);
-        const double    expected = 4.0 * params.rotor_thrust_constant_Ns2 * integral / T;
+        const double     T = 0.08, tau = k ? params.rotor_tau_down_s : params.rotor_tau_up_s, e = exp(-T / tau);
+        const double     command = sqrt((double)0.06f / params.rotor_thrust_constant_Ns2), gap = starts[k] - command;
+        const double     integral = command * command * T + 2.0 * command * gap * tau * (1.0 - e) + 0.5 * gap * gap * tau * (1.0 - e * e);
+        const double     expected = 4.0 * params.rotor_thrust_constant_Ns2 * integral / T;
         ivl_sim_rotors_t whole = rotor_at(&model, starts[k], 0.06f), parts = whole;
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, expected, step(&model, &whole, 0.0, T).thrust_N);
         double sum = 0.0;
@@ -140,7 +140,7 @@ static void test_thrust_is_that_of_the_instant_when_the_step_has_no_length(void)
 {
     const ivl_sim_params_t params = slow_params();
     const ivl_sim_model_t  model = fixture_model(&params);
-    ivl_sim_rotors_t        rotor = rotor_at(&model, 1500.0, 0.15f);
+    ivl_sim_rotors_t       rotor = rotor_at(&model, 1500.0, 0.15f);
     const double           expected = 4.0 * params.rotor_thrust_constant_Ns2 * 1500.0 * 1500.0;
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-7, expected, step(&model, &rotor, 0.0, 0.0).thrust_N);
 }
@@ -150,7 +150,7 @@ static void test_commands_saturate_and_what_is_no_number_stops_the_motor(void)
     const ivl_sim_params_t params = fixture_params();
     const ivl_sim_model_t  model = fixture_model(&params);
     const float            command[4] = {10.0f, -1.0f, NAN, 0.16f};
-    ivl_sim_rotors_t        rotor = hovering(&model);
+    ivl_sim_rotors_t       rotor = hovering(&model);
     command_all(&model, &rotor, command);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, model.rotor_speed_max_radps, rotor.command_radps[0][0]);
     TEST_ASSERT_EQUAL_DOUBLE(0.0, rotor.command_radps[1][0]);
@@ -184,10 +184,10 @@ static void test_scatter_multiplies_each_thrust_when_it_is_set(void)
 {
     const ivl_sim_params_t params = fixture_params();
     const ivl_sim_model_t  model = fixture_model(&params);
-    ivl_sim_rotors_t        rotor = hovering(&model);
+    ivl_sim_rotors_t       rotor = hovering(&model);
     rotor.scatter[0] = ivl_wide(1.1);
     rotor.scatter[3] = ivl_wide(0.9);
-    const double           each = 0.25 * model.mass_total_kg * params.world_gravity_mps2;
+    const double   each = 0.25 * model.mass_total_kg * params.world_gravity_mps2;
     const thrust_t load = step(&model, &rotor, 0.0, 0.002);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, 4.0 * each, load.thrust_N);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, (-1.1 + 0.9) * each * params.rotor_y_m, load.torque_B_Nm[0]);
@@ -229,8 +229,8 @@ static void test_thrust_grows_as_stated_when_the_rotor_nears_the_ceiling(void)
     for (int i = 0; i < 5; i++)
     {
         ivl_sim_rotors_t rotor = hovering(&model);
-        const double height = params.world_ceiling_height_m - params.rotor_z_m - gaps[i];
-        const double ratio = radius / fmax(gaps[i], 0.5 * radius);  // the formula ends at half a radius
+        const double     height = params.world_ceiling_height_m - params.rotor_z_m - gaps[i];
+        const double     ratio = radius / fmax(gaps[i], 0.5 * radius);  // the formula ends at half a radius
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, weight * (1.0 + 0.0625 * ratio * ratio), step(&model, &rotor, height, 0.001).thrust_N);
     }
 }
@@ -239,11 +239,10 @@ static void test_ceiling_effect_vanishes_when_the_vehicle_is_inverted(void)
 {
     ivl_sim_params_t params = fixture_params();
     params.aero_ceiling_gain_norm = 0.0625;
-    const ivl_sim_model_t   model = fixture_model(&params);
-    const flow_t body = {.gap_m = 0.05, .q_WB = {0.0, 1.0, 0.0, 0.0}};
-    ivl_sim_rotors_t         rotor = hovering(&model);
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, model.mass_total_kg * params.world_gravity_mps2,
-                              step_in(&model, &rotor, &body, 0.001).thrust_N);
+    const ivl_sim_model_t model = fixture_model(&params);
+    const flow_t          body = {.gap_m = 0.05, .q_WB = {0.0, 1.0, 0.0, 0.0}};
+    ivl_sim_rotors_t      rotor = hovering(&model);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, model.mass_total_kg * params.world_gravity_mps2, step_in(&model, &rotor, &body, 0.001).thrust_N);
 }
 
 // ---- decay with a share of drag that grows with the square of the speed -------------------------------------------------
@@ -285,9 +284,9 @@ static void test_decay_follows_its_law_for_any_division_of_the_time(void)
         const ivl_sim_model_t  model = fixture_model(&params);
         for (int stop = 0; stop < 2; stop++)
         {
-            const double    start = 2500.0, command = stop ? 0.0 : sqrt((double)0.03f / params.rotor_thrust_constant_Ns2);
+            const double     start = 2500.0, command = stop ? 0.0 : sqrt((double)0.03f / params.rotor_thrust_constant_Ns2);
             ivl_sim_rotors_t rotor = rotor_at(&model, start, stop ? 0.0f : 0.03f);
-            double          t = 0.0;
+            double           t = 0.0;
             while (t < 0.4)
             {
                 const double dt = draw(&draws, 1.0e-5, 0.002);
@@ -303,7 +302,7 @@ static void test_mean_thrust_of_a_decay_is_that_of_a_fine_division(void)
 {
     const ivl_sim_params_t params = drag_params(0.9);
     const ivl_sim_model_t  model = fixture_model(&params);
-    ivl_sim_rotors_t        whole = rotor_at(&model, 2500.0, 0.01f), parts = whole;
+    ivl_sim_rotors_t       whole = rotor_at(&model, 2500.0, 0.01f), parts = whole;
     const double           mean = step(&model, &whole, 0.0, 0.002).thrust_N;
     double                 sum = 0.0;
     for (int i = 0; i < 200; i++)
@@ -317,7 +316,7 @@ static void test_a_rotor_never_falls_below_its_command_and_ends_still(void)
 {
     const ivl_sim_params_t params = drag_params(0.9);
     const ivl_sim_model_t  model = fixture_model(&params);
-    ivl_sim_rotors_t        rotor = rotor_at(&model, 2500.0, 0.02f), stopped = rotor_at(&model, 2500.0, 0.0f);
+    ivl_sim_rotors_t       rotor = rotor_at(&model, 2500.0, 0.02f), stopped = rotor_at(&model, 2500.0, 0.0f);
     double                 last = 2500.0;
     for (int i = 0; i < 3000; i++)
     {
@@ -362,7 +361,7 @@ static void test_voltage_falls_with_the_thrust_of_all_rotors(void)
 {
     const ivl_sim_params_t params = battery_params(0.0);
     const ivl_sim_model_t  model = fixture_model(&params);
-    ivl_sim_rotors_t        rotor = rotor_at(&model, 2000.0, 0.1f);
+    ivl_sim_rotors_t       rotor = rotor_at(&model, 2000.0, 0.1f);
     rotor.speed_radps[2][0] = 1000.0;
     const double square = 3.0 * 2000.0 * 2000.0 + 1000.0 * 1000.0;
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-12, 3.9 - 1.4 * params.rotor_thrust_constant_Ns2 * square, ivl_sim_rotor_voltage(&model, &rotor, 0));
@@ -375,7 +374,7 @@ static void test_command_is_scaled_by_the_voltage_unless_it_is_compensated(void)
         const ivl_sim_params_t params = battery_params(compensated);
         const ivl_sim_model_t  model = fixture_model(&params);
         const double           wanted = sqrt((double)0.08f / params.rotor_thrust_constant_Ns2);
-        ivl_sim_rotors_t        rotor = rotor_at(&model, 2200.0, 0.08f);
+        ivl_sim_rotors_t       rotor = rotor_at(&model, 2200.0, 0.08f);
         const double           scale = 1.0 + 0.8 * (ivl_sim_rotor_voltage(&model, &rotor, 0) / 3.5 - 1.0);
         TEST_ASSERT_TRUE(scale < 0.999);
         TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, compensated ? wanted : scale * wanted, rotor.command_radps[0][0]);
@@ -391,7 +390,7 @@ static void test_thrust_gain_scales_what_is_delivered_below_saturation(void)
     ivl_sim_params_t params = slow_params();
     params.rotor_thrust_gain_norm = 0.9;
     const ivl_sim_model_t model = fixture_model(&params);
-    ivl_sim_rotors_t       rotor = rotor_at(&model, 0.0, 0.1f);
+    ivl_sim_rotors_t      rotor = rotor_at(&model, 0.0, 0.1f);
     TEST_ASSERT_DOUBLE_WITHIN(1.0e-9, sqrt(0.9 * (double)0.1f / params.rotor_thrust_constant_Ns2), rotor.command_radps[0][0]);
     const float all[4] = {1.0f, 1.0f, 1.0f, 1.0f};
     command_all(&model, &rotor, all);
@@ -430,14 +429,14 @@ static void test_thrust_is_lost_to_a_climb_along_the_axis_alone(void)
 {
     ivl_sim_params_t params = slow_params();
     params.rotor_inflow_loss_spm = 0.03;
-    const ivl_sim_model_t   model = fixture_model(&params);
-    const double            weight = model.mass_total_kg * params.world_gravity_mps2;
-    const flow_t climbs = {.v_W_mps = {1.0, -2.0, 2.5}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
-    const flow_t sinks = {.v_W_mps = {1.0, -2.0, -2.5}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
+    const ivl_sim_model_t model = fixture_model(&params);
+    const double          weight = model.mass_total_kg * params.world_gravity_mps2;
+    const flow_t          climbs = {.v_W_mps = {1.0, -2.0, 2.5}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
+    const flow_t          sinks = {.v_W_mps = {1.0, -2.0, -2.5}, .q_WB = {0.0, 0.0, 0.0, 1.0}};
     // nose up by a quarter turn: the axis points along -x
     const flow_t        turned = {.v_W_mps = {-1.0, 0.5, 2.5}, .q_WB = {0.0, -sqrt(0.5), 0.0, sqrt(0.5)}};
     const flow_t *const flows[3] = {&climbs, &sinks, &turned};
-    const double                   expected[3] = {1.0 - 0.03 * 2.5, 1.0, 1.0 - 0.03 * 1.0};
+    const double        expected[3] = {1.0 - 0.03 * 2.5, 1.0, 1.0 - 0.03 * 1.0};
     for (int i = 0; i < 3; i++)
     {
         ivl_sim_rotors_t rotor = hovering(&model);

@@ -102,7 +102,7 @@ static void begin(ivl_sim_group_t *group, const ivl_sim_model_t *model, const iv
 {
     const ivl_sim_foot_t free_feet[IVL_SIM_LEGS] = {IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE, IVL_SIM_FOOT_FREE};
     place_alone(model, group, kin, free_feet);
-    ivl_sim_rotor_command(model, &group->rotor, 0, thrust_N);
+    command_rotors(group, thrust_N);
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
         group->rotor.speed_radps[i][0] = group->rotor.command_radps[i][0];
