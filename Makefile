@@ -19,7 +19,7 @@ export CC CLANG
 VENV   := .venv
 BIN    := $(VENV)/bin
 UNITY  := build/unity
-GOLDEN := release O0 sse2 avx2 clang clang-O0
+GOLDEN := release O0 clang clang-O0
 STM32  := stm32-Os stm32-O2 stm32-clang
 # a -j given by the user is passed on; without one the C code is compiled on all cores
 SUBMAKE = $(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS)) -Otarget

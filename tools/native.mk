@@ -9,15 +9,12 @@ CLANG   ?= clang-14
 
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
-# sse2 and avx2 are the release held to registers of 128 and 256 bits; the tests of `shared` link the product as libraries, so that a changed
-# source costs one link and not one for each test
-FLAVOURS           := release O0 shared san sse2 avx2 clang clang-O0 fuzz
+# the tests of `shared` link the product as libraries, so that a changed source costs one link and not one for each test
+FLAVOURS           := release O0 shared san clang clang-O0 fuzz
 OPTIMISE_release   := -O3 -fno-semantic-interposition
 OPTIMISE_O0        := -O0
 OPTIMISE_shared    := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
-OPTIMISE_sse2      := -O3 -DIVL_SIM_WIDEST_BITS=128
-OPTIMISE_avx2      := -O3 -DIVL_SIM_WIDEST_BITS=256
 OPTIMISE_clang     := -O3
 OPTIMISE_clang-O0  := -O0
 OPTIMISE_fuzz      := -O2 -g -fno-omit-frame-pointer $(SANITIZE)
@@ -29,8 +26,9 @@ COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(CC))
 WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
 
-# no contraction and no -march: the same source gives the same bits on every machine and compiler
-CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPIC -pthread \
+# no contraction: the same source gives the same bits on every machine and compiler, whatever its instructions
+# the flight core also in halves, for vehicles side by side
+CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -DIVL_SIDE_BY_SIDE -fno-math-errno -fPIC -pthread \
           -Ifirmware/core -Isim_sil -Isim_sil/physics -Isim_sil/world
 LDLIBS := -lm -pthread
 
@@ -38,7 +36,9 @@ LDLIBS := -lm -pthread
 ifneq ($(findstring Free Software Foundation,$(shell $(CC) --version)),)
 LTO_release := -flto -ffat-lto-objects
 LTO_LINK_release := -flto=auto
+COMBINE_release = $(COMPILER) $(CFLAGS) $(LTO_LINK_release) -flinker-output=nolto-rel -nostdlib -r
 endif
+COMBINE = $(or $(COMBINE_$(FLAVOUR)),ld -r)
 
 # further flags of a folder, and of a single object by its name without folder and suffix
 # the simulator passes vectors by value, within one compilation only: the note that their ABI once changed is idle; it has the app's senses
@@ -76,9 +76,20 @@ CFLAGS += -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
 endif
 
 BUILD   := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
+
+# Physics and world are compiled once more for each wider register: rollouts side by side, and the instructions that act on them.  Each such set is
+# one object, which shows the functions of sim_width.c and hides the rest.
+MACHINE   := $(shell $(COMPILER) -dumpmachine)
+WIDTHS    := $(if $(findstring x86_64,$(MACHINE)),4 8)
+WIDTH_4   := -mavx2
+WIDTH_8   := -mavx512f -mavx512dq -mavx512vl -mprefer-vector-width=512
+SHOWN     := ivl_sim_fly ivl_sim_hover
+WIDE      := $(WIDTHS:%=$(BUILD)/lanes%.o)
+WIDE_PART := $(patsubst %.c,%.o,$(wildcard sim_sil/physics/*.c sim_sil/world/*.c))
+
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
 SENSES  := firmware/app/app_senses.c
-SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES))
+SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES)) $(WIDE)
 CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
@@ -187,19 +198,31 @@ run-test_%: $(BUILD)/test_% FORCE
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(<D)) $(FLAGS_$(basename $(@F))) $(WIDTH) -MMD -MP -c -o $@ $<
 endef
 
 $(BUILD)/%.o: %.c $(BUILD)/flags.txt
 	$(compile)
+
+define width
+$(BUILD)/lanes$1/%.o: WIDTH = -DIVL_SIM_LANES=$1 $(WIDTH_$1)
+$(BUILD)/lanes$1/%.o: %.c $(BUILD)/flags.txt
+	$$(compile)
+
+$(BUILD)/lanes$1.o: $(WIDE_PART:%=$(BUILD)/lanes$1/%) $(BUILD)/objects.txt
+	@echo '  LD    $$@'
+	@$(COMBINE) -o $$@ $$(filter %.o,$$^)
+	@objcopy $(SHOWN:%=--keep-global-symbol=%_lanes$1) $$@
+endef
+$(foreach n,$(WIDTHS),$(eval $(call width,$n)))
 
 $(BUILD)/unity.o: WARNINGS :=
 $(BUILD)/unity.o: $(UNITY)/unity.c tools/native.mk
 	$(compile)
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
-ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(LTO_LINK_$(FLAVOUR)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
-ALL_OBJECTS := $(CORE) $(SIM) $(CF) $(CRTP) $(SUPPORT)
+ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(LTO_LINK_$(FLAVOUR)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_% WIDTH_%,$(.VARIABLES))),$v=$($v))
+ALL_OBJECTS := $(WIDE_PART) $(CORE) $(SIM) $(CF) $(CRTP) $(SUPPORT)
 
 define remember
 @mkdir -p $(@D)
@@ -212,4 +235,5 @@ $(BUILD)/flags.txt: FORCE
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(BUILD)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(BUILD)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o) \
+    $(foreach n,$(WIDTHS),$(WIDE_PART:%=$(BUILD)/lanes$n/%)))

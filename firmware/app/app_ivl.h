@@ -99,14 +99,14 @@ typedef struct
 
     // what is sensed
     app_senses_t  senses;
-    uint64_t      t_link_us;           ///< when the link was last up
-    uint64_t      t_host_us;           ///< when the host last sent a command
-    bool          has_host;            ///< it ever did
-    _Atomic float p_sigma_m;           ///< written by the app's task
-    app_seen_t    seen;                ///< by a camera, of the latest sampling instant; zero without one
-    atomic_bool   motors_bypassed;     ///< written by the app's task
-    bool          configured;          ///< a configuration was put in force since the start
-    bool          starts_on_path;      ///< a simulated landing: an approach puts the vehicle on its path, whatever it did before
+    uint64_t      t_link_us;        ///< when the link was last up
+    uint64_t      t_host_us;        ///< when the host last sent a command
+    bool          has_host;         ///< it ever did
+    _Atomic float p_sigma_m;        ///< written by the app's task
+    app_seen_t    seen;             ///< by a camera, of the latest sampling instant; zero without one
+    atomic_bool   motors_bypassed;  ///< written by the app's task
+    bool          configured;       ///< a configuration was put in force since the start
+    bool          starts_on_path;   ///< a simulated landing: an approach puts the vehicle on its path, whatever it did before
 
     // who drives the motors
     app_owner_t    owner;
