@@ -315,8 +315,10 @@ def recipe(makefile: tuple[str, ...], path: str, targets: tuple[str, ...]) -> tu
 
 
 def recipes(area: Area, path: str) -> dict[str, tuple[list[str], list[Path]]]:
-    """How a source is built again: into the libraries, and into the test of the app where that is asked."""
-    found = {"libraries": recipe(tuple(NATIVE), path, tuple(LIBRARIES))}
+    """How a source is built again: into the libraries, if a test links them, and into each test of the app."""
+    found = {}
+    if any(test not in APP_TESTS for test in programs(area)):
+        found["libraries"] = recipe(tuple(NATIVE), path, tuple(LIBRARIES))
     for test in APP_TESTS:
         if test in area.tests:
             found[test] = recipe(tuple(APP), path, (program(test)[0],))
@@ -347,7 +349,7 @@ def try_c(area: Area, mutant: Mutant, limits: dict[str, int], finders: Counter[t
     """Compile a fault, and run tests until one fails."""
     how = recipes(area, mutant.path)
     with with_fault(mutant, [file for _, made in how.values() for file in made]):
-        if not follow(how["libraries"][0]):
+        if "libraries" in how and not follow(how["libraries"][0]):
             return Verdict(mutant, NONE)
         for test in in_order(programs(area), mutant.path, finders):
             if test in how and not follow(how[test][0]):
