@@ -15,6 +15,8 @@ ifeq ($(origin CC),default)
 CC := $(if $(shell command -v gcc),gcc,cc)
 endif
 export CC CLANG
+# every program of the tests loads the package: it is compiled once, not by each of them
+unexport PYTHONDONTWRITEBYTECODE
 
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -230,7 +232,7 @@ FORMS_TESTS    := test_ivl_policy test_ivl_parts test_ivl_wire test_ivl_fuzz
 FORMS_ON_STM32 := test_ivl_policy test_ivl_parts
 
 .PHONY: test-forms
-test-forms: setup-dev build toolchain cross-toolchain $(UNITY)/unity.c ## forms of a policy that no product file knows: learned, swept, reported, flown everywhere
+test-forms: setup-dev build toolchain firmware pil-unity-stm32-Os $(UNITY)/unity.c ## forms of a policy that no product file knows: learned, swept, reported, flown everywhere
 	$(say) 'test-forms: library, software vehicle, image and app with the forms of tests/forms, and their C tests'
 	@+$(NATIVE) FORMS=tests/forms lib sil $(FORMS_TESTS:%=run-%)
 	@+$(CROSS) FORMS=tests/forms build/stm32-Os-tests-forms/tick_server.elf $(FORMS_ON_STM32:%=run-%)

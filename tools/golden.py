@@ -104,14 +104,18 @@ def report(threads: int) -> str:
     return "".join(fly(name, threads) + "\n" for name in CASES)
 
 
-def report_of(library: Path, threads: int) -> str:
-    """The lines of all cases as that library computes them, from a process of its own; raise if it fails."""
+def reports_of(library: Path) -> dict[int, str]:
+    """Number of threads -> the lines of all cases as that library computes them; raise if it fails.
+
+    A process has one library, so each library has a process of its own.
+    """
     environment = dict(os.environ, IVL_NATIVE_LIBRARY=str(library.resolve()))
-    command = [sys.executable, str(Path(__file__).resolve()), "--fly", str(threads)]
+    command = [sys.executable, str(Path(__file__).resolve()), "--fly"]
     run = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    if run.returncode != 0 or not run.stdout:
-        raise RuntimeError(f"{library}, {threads} threads: exit code {run.returncode}\n{run.stderr}")
-    return run.stdout
+    lines = run.stdout.splitlines(keepends=True)
+    if run.returncode != 0 or len(lines) != len(THREADS) * len(CASES):
+        raise RuntimeError(f"{library}: exit code {run.returncode}, {len(lines)} lines\n{run.stderr}")
+    return {n: "".join(lines[i * len(CASES) : (i + 1) * len(CASES)]) for i, n in enumerate(THREADS)}
 
 
 def differences(expected: str, found: str, label: str) -> int:
@@ -129,15 +133,15 @@ def main() -> int:
     """Compare all libraries with the reference; return 0 if every bit is equal."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--update", action="store_true", help="write the reference, if all libraries agree on it")
-    parser.add_argument("--fly", type=int, metavar="THREADS", help="print the lines of the loaded library, then end")
+    parser.add_argument("--fly", action="store_true", help="print the lines of the loaded library, then end")
     parser.add_argument("libraries", nargs="*", type=Path)
     args = parser.parse_args()
-    if args.fly is not None:
-        print(report(args.fly), end="")
+    if args.fly:
+        print("".join(report(n) for n in THREADS), end="")
         return 0
     if not args.libraries:
         parser.error("no library given")
-    reports = {(path, n): report_of(path, n) for path in args.libraries for n in THREADS}
+    reports = {(path, n): lines for path in args.libraries for n, lines in reports_of(path).items()}
     first = next(iter(reports.values()))
     if not args.update and not REFERENCE.exists():
         print(f"error: {REFERENCE} does not exist; make golden-update writes it", file=sys.stderr)

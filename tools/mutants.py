@@ -209,6 +209,9 @@ def run_pytest(test: str, processor_s: int = int(TIME_S)) -> int:
             for fd in (0, 1, 2):
                 os.dup2(quiet, fd)
             os.chdir(TREE)
+            # a fault may have the size of what it replaces, and come within the same second: nothing compiled may be kept
+            sys.dont_write_bytecode = True
+            os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
             os.environ["PYTHONPATH"] = str(TREE / "host")
             os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(TREE / "found")
             sys.path.insert(0, str(TREE / "host"))

@@ -67,23 +67,28 @@ FLAGS_sim_sil/cf   += -fsanitize-coverage=inline-8bit-counters,pc-table
 FLAGS_firmware/app += -fsanitize-coverage=inline-8bit-counters,pc-table
 endif
 
-# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h
+# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h.  Of the other sources only ivl_form.c
+# sees them, so all other objects are those of the build without them.
+PLAIN := build/$(FLAVOUR)
 ifneq ($(FORMS),)
-CFLAGS += -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+BUILD       := $(PLAIN)-$(subst /,-,$(FORMS))
+FORMS_FLAGS := -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+FORMS_CORE  := firmware/core/ivl_form.c $(wildcard $(FORMS)/*.c)
+else
+BUILD       := $(PLAIN)
 endif
 
-BUILD   := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
-CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
+CORE    := $(patsubst %.c,$(PLAIN)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
 SENSES  := firmware/app/app_senses.c
-SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES))
-CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
-SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
+SIM     := $(patsubst %.c,$(PLAIN)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES))
+CF      := $(patsubst %.c,$(PLAIN)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
+SUPPORT := $(patsubst %.c,$(PLAIN)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
 EXPORTS := sim_sil/exports.map
 LIBRARY := host/ivl/_native/libivl_sil.so
 SERVER  := host/ivl/_native/ivl_sil
-CRTP    := $(patsubst %.c,$(BUILD)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
-FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
+CRTP    := $(patsubst %.c,$(PLAIN)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
+FAKE_CF := $(PLAIN)/tests/crtp/fake_cf.o
 
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -115,25 +120,25 @@ $(SERVER): $(BUILD)/ivl_sil
 	@mkdir -p $(@D)
 	@cp $< $@.new && mv -f $@.new $@
 
-$(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/objects.txt
+$(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(PLAIN)/sim_sil/crtp/crtp_main.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -o $@ $(filter %.o,$^) $(LDLIBS)
 
 fuzz: $(BUILD)/fuzz_crtp
 
-$(BUILD)/fuzz_crtp: $(BUILD)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
+$(BUILD)/fuzz_crtp: $(PLAIN)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(CORE) $(SIM) $(CRTP) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_crtp_%: $(PLAIN)/tests/c/test_crtp_%.o $(CORE) $(SIM) $(CRTP) $(FAKE_CF) $(SUPPORT) $(PLAIN)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_%: $(PLAIN)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(PLAIN)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(CORE) $(SIM) $(CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_cf_%: $(PLAIN)/tests/c/test_cf_%.o $(CORE) $(SIM) $(CF) $(SUPPORT) $(PLAIN)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
 
@@ -143,14 +148,20 @@ run-test_%: $(BUILD)/test_% FORCE
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(@D:$(PLAIN)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
 endef
 
-$(BUILD)/%.o: %.c $(BUILD)/flags.txt
+$(PLAIN)/%.o: %.c $(PLAIN)/flags.txt
 	$(compile)
 
-$(BUILD)/unity.o: WARNINGS :=
-$(BUILD)/unity.o: $(UNITY)/unity.c tools/native.mk
+ifneq ($(FORMS),)
+$(BUILD)/%.o: private CFLAGS += $(FORMS_FLAGS)
+$(BUILD)/%.o: %.c $(PLAIN)/flags.txt
+	$(compile)
+endif
+
+$(PLAIN)/unity.o: WARNINGS :=
+$(PLAIN)/unity.o: $(UNITY)/unity.c tools/native.mk
 	$(compile)
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
@@ -162,10 +173,10 @@ define remember
 @printf '%s\n' '$1' | cmp -s - $@ || printf '%s\n' '$1' > $@
 endef
 
-$(BUILD)/flags.txt: FORCE
+$(PLAIN)/flags.txt: FORCE
 	$(call remember,$(ALL_FLAGS))
 
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(PLAIN)/sim_sil/crtp/crtp_main.o $(PLAIN)/tests/fuzz/fuzz_crtp.o $(SUPPORT) $(TESTS:%=$(PLAIN)/tests/c/%.o))
