@@ -19,13 +19,13 @@ HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h firmware/
 
 # ---- host: sanitizers on, strict warnings on our own files
 
-HOST_PLAIN := build/app
-HOST       := $(HOST_PLAIN)$(OWN)
+HOST_SHARED := build/app
+HOST       := $(HOST_SHARED)$(OWN)
 HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=all \
               -Wall -Wextra -Wdouble-promotion -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes -Werror \
               -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -Itests/c -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
 HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,firmware/core/ivl_form.c $(FORMS_SOURCES)) \
-              $(patsubst %.c,$(HOST_PLAIN)/%.o,$(filter-out %/ivl_form.c,$(SOURCES)) tests/app/sdk_double.c tests/c/default_fixture.c) $(HOST_PLAIN)/unity.o
+              $(patsubst %.c,$(HOST_SHARED)/%.o,$(filter-out %/ivl_form.c,$(SOURCES)) tests/app/sdk_double.c tests/c/default_fixture.c) $(HOST_SHARED)/unity.o
 SEQUENCES  ?= 3000
 SEED       ?= 1
 # a hundred thousand take an hour on a busy machine
@@ -61,7 +61,7 @@ $(HOST)/sequences: $(HOST)/tests/fuzz/sequences.o $(HOST_OBJ)
 	@echo '  LINK  $@'
 	@$(CC) $(HOST_FLAGS) -o $@ $^ -lm
 
-$(HOST_PLAIN)/unity.o: $(UNITY)/unity.c
+$(HOST_SHARED)/unity.o: $(UNITY)/unity.c
 	@mkdir -p $(@D)
 	@$(CC) -DUNITY_INCLUDE_DOUBLE -I$(UNITY) -fsanitize=address,undefined -c -o $@ $<
 
@@ -71,7 +71,7 @@ define compile_host
 @$(CC) $(HOST_FLAGS) -c -o $@ $<
 endef
 
-$(HOST_PLAIN)/%.o: %.c $(HEADERS) tools/app.mk
+$(HOST_SHARED)/%.o: %.c $(HEADERS) tools/app.mk
 	$(compile_host)
 
 ifneq ($(FORMS),)

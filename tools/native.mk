@@ -8,13 +8,11 @@ CLANG   ?= clang-14
 
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
-# sse2 and avx2 are the release held to registers of 128 and 256 bits
+# sse2 and avx2 are the release held to registers of 128 and 256 bits: its objects, but for the one that knows of widths
 FLAVOURS           := release O0 san sse2 avx2 clang clang-O0 fuzz
 OPTIMISE_release   := -O3 -fno-semantic-interposition
 OPTIMISE_O0        := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
-OPTIMISE_sse2      := -O3 -DIVL_SIM_WIDEST_BITS=128
-OPTIMISE_avx2      := -O3 -DIVL_SIM_WIDEST_BITS=256
 OPTIMISE_clang     := -O3
 OPTIMISE_clang-O0  := -O0
 OPTIMISE_fuzz      := -O2 -g -fno-omit-frame-pointer $(SANITIZE)
@@ -23,19 +21,40 @@ $(error FLAVOUR=$(FLAVOUR) is not one of: $(FLAVOURS))
 endif
 COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(CC))
 
+# A build may take the objects of another, BASE, and compile few sources of its own, with further flags.
+BASE        := $(FLAVOUR)
+ifneq ($(filter sse2 avx2,$(FLAVOUR)),)
+BASE        := release
+OWN_SOURCES := sim_sil/physics/phys_step.c
+OWN_FLAGS   := -DIVL_SIM_WIDEST_BITS=$(if $(filter sse2,$(FLAVOUR)),128,256)
+endif
+# FORMS=folder adds forms of policies: its sources, and its forms.h, which only ivl_form.c includes
+ifneq ($(FORMS),)
+OWN_SOURCES += firmware/core/ivl_form.c $(wildcard $(FORMS)/*.c)
+OWN_FLAGS   += -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+endif
+SHARED  := build/$(BASE)
+BUILD   := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
+objects  = $(patsubst %.c,$(SHARED)/%.o,$(filter-out $(OWN_SOURCES),$1)) $(patsubst %.c,$(BUILD)/%.o,$(filter $(OWN_SOURCES),$1))
+
 WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
 
 # no contraction and no -march: the same source gives the same bits on every machine and compiler
-CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPIC -pthread \
+CFLAGS := -std=c11 $(OPTIMISE_$(BASE)) -ffp-contract=off -fno-math-errno -fPIC -pthread \
           -Ifirmware/core -Isim_sil -Isim_sil/physics -Isim_sil/world
 LDLIBS := -lm -pthread
 
-# objects of the release flavour also carry what GCC needs to optimise the library as a whole; the tests link them as they are
+# objects of the release flavour also carry what GCC needs to optimise library and vehicle as a whole; all others link them as they are, which
+# GCC does only if it is told to
 ifneq ($(findstring Free Software Foundation,$(shell $(CC) --version)),)
 LTO_release := -flto -ffat-lto-objects
 LTO_LINK_release := -flto=auto
 endif
+AS_THEY_ARE := -fno-lto
+LTO_LINK    := $(or $(LTO_LINK_$(FLAVOUR)),$(AS_THEY_ARE))
+# nothing is inlined into this source or out of it, and it takes as long to compile as all others together
+FLAGS_phys_step := -fno-lto
 
 # further flags of a folder, and of a single object by its name without folder and suffix
 # the simulator passes vectors by value, within one compilation only: the note that their ABI once changed is idle; it has the app's senses
@@ -67,28 +86,17 @@ FLAGS_sim_sil/cf   += -fsanitize-coverage=inline-8bit-counters,pc-table
 FLAGS_firmware/app += -fsanitize-coverage=inline-8bit-counters,pc-table
 endif
 
-# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h.  Of the other sources only ivl_form.c
-# sees them, so all other objects are those of the build without them.
-PLAIN := build/$(FLAVOUR)
-ifneq ($(FORMS),)
-BUILD       := $(PLAIN)-$(subst /,-,$(FORMS))
-FORMS_FLAGS := -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
-FORMS_CORE  := firmware/core/ivl_form.c $(wildcard $(FORMS)/*.c)
-else
-BUILD       := $(PLAIN)
-endif
-
-CORE    := $(patsubst %.c,$(PLAIN)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
+CORE    := $(call objects,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
 SENSES  := firmware/app/app_senses.c
-SIM     := $(patsubst %.c,$(PLAIN)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES))
-CF      := $(patsubst %.c,$(PLAIN)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
-SUPPORT := $(patsubst %.c,$(PLAIN)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
+SIM     := $(call objects,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES))
+CF      := $(call objects,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
+SUPPORT := $(call objects,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
 EXPORTS := sim_sil/exports.map
 LIBRARY := host/ivl/_native/libivl_sil.so
 SERVER  := host/ivl/_native/ivl_sil
-CRTP    := $(patsubst %.c,$(PLAIN)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
-FAKE_CF := $(PLAIN)/tests/crtp/fake_cf.o
+CRTP    := $(call objects,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
+FAKE_CF := $(SHARED)/tests/crtp/fake_cf.o
 
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -114,33 +122,33 @@ $(LIBRARY): $(BUILD)/libivl_sil.so
 
 $(BUILD)/libivl_sil.so: $(CORE) $(SIM) $(BUILD)/objects.txt $(EXPORTS)
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -shared -Wl,-Bsymbolic -Wl,--version-script=$(EXPORTS) -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) $(LTO_LINK) -shared -Wl,-Bsymbolic -Wl,--version-script=$(EXPORTS) -o $@ $(filter %.o,$^) $(LDLIBS)
 
 $(SERVER): $(BUILD)/ivl_sil
 	@mkdir -p $(@D)
 	@cp $< $@.new && mv -f $@.new $@
 
-$(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(PLAIN)/sim_sil/crtp/crtp_main.o $(BUILD)/objects.txt
+$(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(SHARED)/sim_sil/crtp/crtp_main.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) $(LTO_LINK) -o $@ $(filter %.o,$^) $(LDLIBS)
 
 fuzz: $(BUILD)/fuzz_crtp
 
-$(BUILD)/fuzz_crtp: $(PLAIN)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
+$(BUILD)/fuzz_crtp: $(SHARED)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/test_crtp_%: $(PLAIN)/tests/c/test_crtp_%.o $(CORE) $(SIM) $(CRTP) $(FAKE_CF) $(SUPPORT) $(PLAIN)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_crtp_%: $(SHARED)/tests/c/test_crtp_%.o $(CORE) $(SIM) $(CRTP) $(FAKE_CF) $(SUPPORT) $(SHARED)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) $(AS_THEY_ARE) -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/test_%: $(PLAIN)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(PLAIN)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_%: $(SHARED)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(SHARED)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) $(AS_THEY_ARE) -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/test_cf_%: $(PLAIN)/tests/c/test_cf_%.o $(CORE) $(SIM) $(CF) $(SUPPORT) $(PLAIN)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_cf_%: $(SHARED)/tests/c/test_cf_%.o $(CORE) $(SIM) $(CF) $(SUPPORT) $(SHARED)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) $(AS_THEY_ARE) -o $@ $(filter %.o,$^) $(LDLIBS)
 
 run-test_%: $(BUILD)/test_% FORCE
 	@tools/run_unity.sh $<
@@ -148,24 +156,24 @@ run-test_%: $(BUILD)/test_% FORCE
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(@D:$(PLAIN)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(LTO_$(BASE)) $(WARNINGS) $(FLAGS_$(patsubst $(BUILD)/%,%,$(@D:$(SHARED)/%=%))) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
 endef
 
-$(PLAIN)/%.o: %.c $(PLAIN)/flags.txt
+$(SHARED)/%.o: %.c $(SHARED)/flags.txt
 	$(compile)
 
-ifneq ($(FORMS),)
-$(BUILD)/%.o: private CFLAGS += $(FORMS_FLAGS)
-$(BUILD)/%.o: %.c $(PLAIN)/flags.txt
+ifneq ($(BUILD),$(SHARED))
+$(BUILD)/%.o: private CFLAGS += $(OWN_FLAGS)
+$(BUILD)/%.o: %.c $(SHARED)/flags.txt
 	$(compile)
 endif
 
-$(PLAIN)/unity.o: WARNINGS :=
-$(PLAIN)/unity.o: $(UNITY)/unity.c tools/native.mk
+$(SHARED)/unity.o: WARNINGS :=
+$(SHARED)/unity.o: $(UNITY)/unity.c tools/native.mk
 	$(compile)
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
-ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(LTO_LINK_$(FLAVOUR)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
+ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(BASE)) $(LTO_LINK_$(BASE)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
 ALL_OBJECTS := $(CORE) $(SIM) $(CF) $(CRTP) $(SUPPORT)
 
 define remember
@@ -173,10 +181,10 @@ define remember
 @printf '%s\n' '$1' | cmp -s - $@ || printf '%s\n' '$1' > $@
 endef
 
-$(PLAIN)/flags.txt: FORCE
+$(SHARED)/flags.txt: FORCE
 	$(call remember,$(ALL_FLAGS))
 
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(PLAIN)/sim_sil/crtp/crtp_main.o $(PLAIN)/tests/fuzz/fuzz_crtp.o $(SUPPORT) $(TESTS:%=$(PLAIN)/tests/c/%.o))
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(SHARED)/sim_sil/crtp/crtp_main.o $(SHARED)/tests/fuzz/fuzz_crtp.o $(SUPPORT) $(TESTS:%=$(SHARED)/tests/c/%.o))

@@ -46,18 +46,18 @@ FLAGS_test_ivl_math := -DSWEEP_STRIDE=97
 FLAGS_startup := -fno-builtin
 
 BUILD    := build/$(FLAVOUR)
-PLAIN    := $(BUILD)
+SHARED    := $(BUILD)
 # FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h.  Of the other sources only ivl_form.c
 # sees them, so all other objects are those of the build without them.
 ifneq ($(FORMS),)
-BUILD       := $(PLAIN)-$(subst /,-,$(FORMS))
+BUILD       := $(SHARED)-$(subst /,-,$(FORMS))
 FORMS_FLAGS := -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
 FORMS_CORE  := firmware/core/ivl_form.c $(wildcard $(FORMS)/*.c)
 endif
 TARGET   := firmware/stm32f405
 PROGRAMS := tick_server replay faults
-CORE     := $(patsubst %.c,$(PLAIN)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
-COMMON   := $(PLAIN)/$(TARGET)/startup.o $(PLAIN)/$(TARGET)/semihost.o
+CORE     := $(patsubst %.c,$(SHARED)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
+COMMON   := $(SHARED)/$(TARGET)/startup.o $(SHARED)/$(TARGET)/semihost.o
 TESTS    := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_ivl_*.c))
 INSTALLED := host/ivl/_native/stm32f405.elf
 
@@ -98,15 +98,15 @@ define link
 @$(LINKER) $(LDFLAGS) -o $@ $(filter %.o,$^) -lm
 endef
 
-$(BUILD)/tick_server.elf $(BUILD)/replay.elf: $(BUILD)/%.elf: $(PLAIN)/$(TARGET)/%.o $(PLAIN)/$(TARGET)/serve.o $(CORE) $(COMMON) \
+$(BUILD)/tick_server.elf $(BUILD)/replay.elf: $(BUILD)/%.elf: $(SHARED)/$(TARGET)/%.o $(SHARED)/$(TARGET)/serve.o $(CORE) $(COMMON) \
                                              $(TARGET)/stm32f405.ld
 	$(link)
 
-$(BUILD)/faults.elf: $(PLAIN)/$(TARGET)/faults.o $(COMMON) $(TARGET)/stm32f405.ld
+$(BUILD)/faults.elf: $(SHARED)/$(TARGET)/faults.o $(COMMON) $(TARGET)/stm32f405.ld
 	$(link)
 
-$(BUILD)/test_%.elf: $(PLAIN)/tests/c/test_%.o $(CORE) $(COMMON) $(PLAIN)/tests/c/default_fixture.o $(PLAIN)/unity.o \
-                     $(PLAIN)/$(TARGET)/unity_output.o $(TARGET)/stm32f405.ld
+$(BUILD)/test_%.elf: $(SHARED)/tests/c/test_%.o $(CORE) $(COMMON) $(SHARED)/tests/c/default_fixture.o $(SHARED)/unity.o \
+                     $(SHARED)/$(TARGET)/unity_output.o $(TARGET)/stm32f405.ld
 	$(link)
 
 run-test_%: $(BUILD)/test_%.elf FORCE
@@ -115,27 +115,27 @@ run-test_%: $(BUILD)/test_%.elf FORCE
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(SYSTEM) $(WARNINGS) $(FLAGS_$(@D:$(PLAIN)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(SYSTEM) $(WARNINGS) $(FLAGS_$(@D:$(SHARED)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
 endef
 
-$(PLAIN)/%.o: %.c $(PLAIN)/flags.txt
+$(SHARED)/%.o: %.c $(SHARED)/flags.txt
 	$(compile)
 
 ifneq ($(FORMS),)
 $(BUILD)/%.o: private CFLAGS += $(FORMS_FLAGS)
-$(BUILD)/%.o: %.c $(PLAIN)/flags.txt
+$(BUILD)/%.o: %.c $(SHARED)/flags.txt
 	$(compile)
 endif
 
-$(PLAIN)/unity.o: WARNINGS :=
-$(PLAIN)/unity.o: $(UNITY)/unity.c $(PLAIN)/flags.txt
+$(SHARED)/unity.o: WARNINGS :=
+$(SHARED)/unity.o: $(UNITY)/unity.c $(SHARED)/flags.txt
 	$(compile)
 
 # rewritten only when their content changes: compile anew when flags do
 ALL_FLAGS = $(COMPILER) $(CFLAGS) $(SYSTEM) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
 
-$(PLAIN)/flags.txt: FORCE
+$(SHARED)/flags.txt: FORCE
 	@mkdir -p $(@D)
 	@printf '%s\n' "$(ALL_FLAGS)" | cmp -s - $@ || printf '%s\n' "$(ALL_FLAGS)" > $@
 
--include $(wildcard $(foreach folder,$(sort $(PLAIN) $(BUILD)),$(folder)/*.d $(folder)/*/*.d $(folder)/*/*/*.d))
+-include $(wildcard $(foreach folder,$(sort $(SHARED) $(BUILD)),$(folder)/*.d $(folder)/*/*.d $(folder)/*/*/*.d))
