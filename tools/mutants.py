@@ -209,7 +209,7 @@ def run_pytest(test: str, processor_s: int = int(TIME_S)) -> int:
             for fd in (0, 1, 2):
                 os.dup2(quiet, fd)
             os.chdir(TREE)
-            # a fault may have the size of what it replaces, and come within the same second: nothing compiled may be kept
+            # a fault may have the size and the time of what it replaces: nothing compiled may be kept
             sys.dont_write_bytecode = True
             os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
             os.environ["PYTHONPATH"] = str(TREE / "host")

@@ -33,7 +33,7 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="session")
 def vertical() -> Experiment:
     """The paper's vertical landing, learned and judged within a second."""
-    settings = ["learner.name=ephe_robust", "n_rollouts=4", "budget=12", "check.n_fresh=10", "check.effort=0.05"]
+    settings = ["learner.name=ephe_robust", "n_rollouts=4", "budget=12", "check.n_fresh=10", "check.effort=0.01"]
     settings += [
         "check.grid.rrev_c_per_s={lo: 4.5, hi: 5.0, step: 0.1}",
         "check.grid.moment_y_Nmm={lo: 7.0, hi: 9.0, step: 1.0}",
