@@ -229,11 +229,15 @@ def run_pytest(test: str, processor_s: int = int(TIME_S)) -> int:
     return -1
 
 
+def files_in(folder: Path) -> list[Path]:
+    """All files below a folder, but for what Python has compiled, which comes and goes while other tests run."""
+    return [Path(at, name) for at, _, names in os.walk(folder) for name in names if Path(at).name != "__pycache__"]
+
+
 def copy_tree() -> None:
     """The tree as it is; what was compiled in the copy before is kept, and makefiles compile what has changed since."""
     for name in ("firmware", "sim_sil", "tests", "tools", "host", "build/unity"):
-        wanted = {p.relative_to(ROOT) for p in (ROOT / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
-        there = {p.relative_to(TREE) for p in (TREE / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        wanted, there = ({p.relative_to(root) for p in files_in(root / name)} for root in (ROOT, TREE))
         for path in there - wanted:
             (TREE / path).unlink()
         for path in wanted:
