@@ -1,6 +1,7 @@
 """Compare the bits of reference landings across compilers, optimisation levels, register widths and thread counts.
 
-Each library given is loaded in a process of its own and flies the same landings. What they computed must be equal, and
+Each library given is loaded in processes of their own and flies the same landings, in registers of every width that
+this machine has. What they computed must be equal, and
 equal to the reference in tests/golden/landings.txt, which changes with the physics: in its own commit, with the reason.
 
 usage: golden.py [--update] LIBRARY...
@@ -15,7 +16,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-THREADS = (1, 2, 5)
+RUNS = {0: (1, 2, 5), 256: (2,), 128: (1,)}
+"""Bits of the registers, 0: the widest; numbers of threads."""
 STREAMS = 9  # one more than the library flies side by side
 REFERENCE = Path(__file__).parent.parent / "tests" / "golden" / "landings.txt"
 
@@ -104,18 +106,22 @@ def report(threads: int) -> str:
     return "".join(fly(name, threads) + "\n" for name in CASES)
 
 
-def reports_of(library: Path) -> dict[int, str]:
-    """Number of threads -> the lines of all cases as that library computes them; raise if it fails.
+def widest() -> int:
+    """Bits of this machine's widest registers."""
+    from ivl import native
 
-    A process has one library, so each library has a process of its own.
-    """
-    environment = dict(os.environ, IVL_NATIVE_LIBRARY=str(library.resolve()))
-    command = [sys.executable, str(Path(__file__).resolve()), "--fly"]
+    return native.library().use_registers()
+
+
+def reports_of(library: Path, bits: int) -> dict[tuple[Path, int, int], str]:
+    """The lines of all cases by library, bits and threads, all threads from one process; raise if it fails."""
+    environment = dict(os.environ, IVL_NATIVE_LIBRARY=str(library.resolve()), IVL_REGISTER_BITS=str(bits))
+    command = [sys.executable, str(Path(__file__).resolve()), "--fly", *map(str, RUNS[bits])]
     run = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    lines = run.stdout.splitlines(keepends=True)
-    if run.returncode != 0 or len(lines) != len(THREADS) * len(CASES):
-        raise RuntimeError(f"{library}: exit code {run.returncode}, {len(lines)} lines\n{run.stderr}")
-    return {n: "".join(lines[i * len(CASES) : (i + 1) * len(CASES)]) for i, n in enumerate(THREADS)}
+    lines, n = run.stdout.splitlines(keepends=True), len(CASES)
+    if run.returncode != 0 or len(lines) != n * len(RUNS[bits]):
+        raise RuntimeError(f"{library}, {bits} bits: exit code {run.returncode}, {len(lines)} lines\n{run.stderr}")
+    return {(library, bits, threads): "".join(lines[i * n : (i + 1) * n]) for i, threads in enumerate(RUNS[bits])}
 
 
 def differences(expected: str, found: str, label: str) -> int:
@@ -133,21 +139,25 @@ def main() -> int:
     """Compare all libraries with the reference; return 0 if every bit is equal."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--update", action="store_true", help="write the reference, if all libraries agree on it")
-    parser.add_argument("--fly", action="store_true", help="print the lines of the loaded library, then end")
+    parser.add_argument("--fly", type=int, nargs="+", metavar="THREADS", help="print the lines of the loaded library, then end")
     parser.add_argument("libraries", nargs="*", type=Path)
     args = parser.parse_args()
-    if args.fly:
-        print("".join(report(n) for n in THREADS), end="")
+    if args.fly is not None:
+        print("".join(map(report, args.fly)), end="")
         return 0
     if not args.libraries:
         parser.error("no library given")
-    reports = {(path, n): lines for path in args.libraries for n, lines in reports_of(path).items()}
+    runs = [(path, bits) for path in args.libraries for bits in RUNS if bits <= widest()]
+    reports = {key: lines for run in runs for key, lines in reports_of(*run).items()}
     first = next(iter(reports.values()))
     if not args.update and not REFERENCE.exists():
         print(f"error: {REFERENCE} does not exist; make golden-update writes it", file=sys.stderr)
         return 1
     expected = first if args.update else REFERENCE.read_text(encoding="ascii")
-    bad = sum(differences(expected, found, f"{path.parent.name}, {n} threads") for (path, n), found in reports.items())
+    bad = sum(
+        differences(expected, found, f"{path.parent.name}, {f'{bits} bits' if bits else 'widest'}, {threads} threads")
+        for (path, bits, threads), found in reports.items()
+    )
     if bad:
         print("error: the landings changed; if that is meant: make golden-update, and commit it alone", file=sys.stderr)
         return 1
