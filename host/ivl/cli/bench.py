@@ -120,7 +120,7 @@ def _sets(world: World, n: int) -> dict[str, float]:
         "slowest_cell": (Landings(few, 0.25, 60.0, *every), 256),
         "learner": (Landings(n, 2.5, 90.0, *every), 8),
     }
-    result = {}
+    result: dict[str, float] = {}
     for name, (landings, at_once) in sets.items():
         rate, occupancy, _ = _fly(world, landings, at_once)
         result |= {f"rollouts_per_s_{name}": rate, f"occupancy_{name}": occupancy}
