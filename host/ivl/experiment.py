@@ -239,7 +239,7 @@ def load(
     """Read, change and check an experiment.
 
     Args:
-        path: A file; if it does not exist, the same path inside the package.
+        path: A file; if it does not exist, the same path inside the package, or the bare name of one there.
         settings: "a.b=value" each: a field of the experiment, or a world parameter such as "sense.latency=0.01".
         change: Changes the raw data before settings and replacements do.
         **replacements: Fields to replace; None leaves what the file says. `learner` takes a name and drops the options.
@@ -247,16 +247,22 @@ def load(
     Raises:
         ConfigError: One line naming file, field and value.
     """
-    file = locate(path, list_experiments())
-    data = read_mapping(file)
-    if "tasks" in data:
-        raise ConfigError(f"{file.name}: tasks: an experiment for every approach; learn it with ivl policy learn")
+    data, label = read(path)
     if change is not None:
         change(data)
     replace(data, replacements)
     for setting in settings:
-        apply_setting(data, setting, Experiment, file.name)
-    return from_data(data, file.name)
+        apply_setting(data, setting, Experiment, label)
+    return from_data(data, label)
+
+
+def read(path: str) -> tuple[dict[str, Any], str]:
+    """The raw data of an experiment's file, and what errors call the file (path and errors as `load`)."""
+    file = locate(path, list_experiments())
+    data = read_mapping(file)
+    if "tasks" in data:
+        raise ConfigError(f"{file.name}: tasks: an experiment for every approach; learn it with ivl policy learn")
+    return data, file.name
 
 
 def replace(data: dict[str, Any], replacements: Mapping[str, Any]) -> None:

@@ -12,14 +12,20 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ivl import forms, model, native
 from ivl.errors import ArgumentError, NativeError
+from ivl.outcome import as_dict, verdict
 from ivl.surface import Surface
+from ivl.table import Rollouts, Rows
+
+if TYPE_CHECKING:
+    import pandas as pd  # type: ignore[import-untyped]
+    import xarray as xr
 
 START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2, "state": 3}
 _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within seconds
@@ -93,12 +99,32 @@ class Trace:
 
     Attributes:
         rows: Record array of the library's trace table, shape (n_rows,): time, pose, velocities, thrusts, feet,
-            phase, cues.
+            phase, cues (`rows.fields` has units and meanings).
         outcome: The rollout's outcome record, equal to what `World.rollouts` returns for the same arguments.
     """
 
-    rows: np.recarray[Any, Any]
+    rows: Rows
     outcome: np.record
+
+    @property
+    def verdict(self) -> str:
+        """The outcome in words."""
+        return verdict(self.outcome)
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The rows as a data frame (`ivl.table.Table.to_pandas`)."""
+        return self.rows.to_pandas()
+
+    def to_xarray(self) -> "xr.Dataset":
+        """The rows as a data set over the time `t_s`; its attributes are the fields of the outcome."""
+        data = self.rows.to_xarray()
+        library = native.library()
+        data.attrs = as_dict(self.outcome, library.end_reason(int(self.outcome["end_reason"])))
+        return data
+
+    def __repr__(self) -> str:
+        """What was flown, in words."""
+        return f"<trace of a landing: {self.verdict}; {len(self.rows)} rows, {float(self.rows.t_s[-1]):.3f} s>"
 
 
 class World:
@@ -222,7 +248,7 @@ class World:
         stream: npt.ArrayLike | None = None,
         state: State | None = None,
         **named: FloatLike,
-    ) -> np.recarray[Any, Any]:
+    ) -> Rollouts:
         """Fly one rollout for each element of the broadcast of the arguments.
 
         Args:
@@ -241,12 +267,13 @@ class World:
             state: State to start from; for "state" alone, which needs it.
 
         Returns:
-            Record array of outcomes in the shape of the broadcast; fields of the library's outcome table.
+            Record array of outcomes in the shape of the broadcast; fields of the library's outcome table. See
+            `ivl.table.Rollouts` for data frames, units and meanings.
 
         Raises:
             ArgumentError: An argument is not finite, out of range, or does not broadcast.
         """
-        specs, shape = self._specs(
+        specs, shape, given = self._specs(
             start, stream, state, form, theta, named,
             speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
@@ -256,7 +283,7 @@ class World:
         for first in range(0, n, _BATCH_ROLLOUTS):
             part = slice(first, min(first + _BATCH_ROLLOUTS, n))
             outcomes[part] = self._native.rollouts(specs(part), n_threads)
-        return outcomes.reshape(shape).view(np.recarray)
+        return Rollouts.of(outcomes.reshape(shape), given)
 
     def trace(
         self,
@@ -273,7 +300,7 @@ class World:
         **named: float,
     ) -> Trace:
         """Fly one rollout and record it every `period_s` seconds (arguments and errors as `rollouts`, scalars only)."""
-        specs, shape = self._specs(
+        specs, shape, _ = self._specs(
             start, stream, state, form, theta, named,
             speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
         )  # fmt: skip
@@ -282,7 +309,7 @@ class World:
         if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
             raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
         rows, outcome = self._native.trace(specs(slice(0, 1)), period_s)
-        return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
+        return Trace(rows.view(Rows), outcome.view(np.recarray)[0])
 
     def hover(
         self,
@@ -291,7 +318,7 @@ class World:
         seed: npt.ArrayLike = 0,
         stream: npt.ArrayLike | None = None,
         period_s: float = 0.01,
-    ) -> np.recarray[Any, Any]:
+    ) -> Rows:
         """Hover from set-point to set-point, without a landing.
 
         Args:
@@ -324,7 +351,7 @@ class World:
             raise ArgumentError(f"seed, stream: do not broadcast to {shape}, the shape of the flights") from error
         n_rows = round(duration_s / period_s) + 1
         rows = self._native.hovers(points.reshape(-1, *points.shape[-2:]), seeds, period_s, n_rows)
-        return rows.reshape(*shape, n_rows).view(np.recarray)
+        return rows.reshape(*shape, n_rows).view(Rows)
 
     def _setpoints(self, setpoints: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Checked set-points of hovers, shape (..., n, 4)."""
@@ -349,8 +376,8 @@ class World:
         theta: tuple[npt.ArrayLike, ...],
         named: Mapping[str, npt.ArrayLike],
         **arguments: npt.ArrayLike | None,
-    ) -> tuple[Callable[[slice], npt.NDArray[np.void]], tuple[int, ...]]:
-        """What gives a part of the checked, broadcast and flattened specifications, and the shape that all have.
+    ) -> tuple[Callable[[slice], npt.NDArray[np.void]], tuple[int, ...], dict[str, npt.NDArray[Any]]]:
+        """What gives a part of the checked, broadcast and flattened specifications; the shape that all have; arguments.
 
         A specification has room for a long policy, so those of a large batch are not made at once.
         """
@@ -391,7 +418,22 @@ class World:
                     records[name] = array[part]
             return records
 
-        return specs, shape
+        return specs, shape, self._told(given, form, theta, named, shape)
+
+    @staticmethod
+    def _told(
+        given: Mapping[str, npt.NDArray[Any]],
+        form: forms.Form,
+        theta: tuple[npt.ArrayLike, ...],
+        named: Mapping[str, npt.ArrayLike],
+        shape: tuple[int, ...],
+    ) -> dict[str, npt.NDArray[Any]]:
+        """The arguments as they were given, by name: numbers of the policy in the units of their form."""
+        ordered = [*theta, *(named[name] for name in form.names[len(theta) :])]
+        told = {name: given[name] for name in ("speed_mps", "angle_deg", "d_ceil_m") if name in given}
+        told |= {name: np.asarray(value, np.float64) for name, value in zip(form.names, ordered, strict=True)}
+        stream = np.arange(math.prod(shape), dtype=np.uint64).reshape(shape)
+        return told | {"seed": given["seed"], "stream": given.get("stream", stream)}
 
     def _theta(
         self, form: forms.Form, theta: tuple[npt.ArrayLike, ...], named: Mapping[str, npt.ArrayLike]

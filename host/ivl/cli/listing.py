@@ -70,10 +70,10 @@ def _entries(kind: Kind) -> list[dict[str, Any]]:
         found |= {path: f"{general.load([path]).doc} (ivl policy learn)" for path in experiment.list_general()}
         return [{"name": path, "doc": doc} for path, doc in found.items()]
     if kind is Kind.LEARNERS:
-        return [{"name": name, "doc": entry.doc, "options": _options(name)} for name, entry in LEARNERS.items()]
+        return [{"name": name, "doc": entry.doc, "options": _options(name)} for name, entry in LEARNERS.found().items()]
     if kind is Kind.FORMS:
         return [_form(form) for form in forms.forms().values()]
-    return [_reward(reward) for reward in REWARDS.values()]
+    return [_reward(reward) for reward in REWARDS.found().values()]
 
 
 def _form(form: forms.Form) -> dict[str, Any]:
