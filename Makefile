@@ -361,7 +361,7 @@ $(VENV)/.stamp-run: $(BIN)/python pyproject.toml tools/constraints.txt
 
 $(VENV)/.stamp-dev: $(VENV)/.stamp-run
 	$(say) 'setup: installing what tests and lint need'
-	@$(pip) --editable '.[link,sweep,report,live,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
+	@$(pip) --editable '.[link,sweep,report,live,gym,optimisers,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
 	@touch $@
 
 $(UNITY)/unity.c: tools/get_unity.sh tools/unity.txt | $(BIN)/python

@@ -1,6 +1,7 @@
 """The interface for notebooks: results as data frames and data sets, learning from Python, run folders read back."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -172,6 +173,6 @@ def test_mistakes_are_answered_with_a_hint(call: Any, message: str) -> None:
 def test_a_package_that_is_missing_is_named_with_what_installs_it(
     world: ivl.World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
+    monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ivl.MissingError, match=r"pandas is not installed: pip install 'ivl\[frames\]'"):
         world.rollouts(2.5, 90.0, 4.8, 8.0).to_pandas()
