@@ -2,7 +2,7 @@
 #
 # This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
 # Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS, VEHICLE, GEAR, SIL_ARGS,
-# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS.
+# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS, WHEEL_ARGS.
 
 PYTHON     ?= python3
 CLANG      ?= clang-14
@@ -75,6 +75,23 @@ figs: setup build ## the paper's figures 4 to 9 from RUN=... (a sweep's run fold
 cad: setup build openscad ## legs and jigs to print, as STL in build/cad (CAD_ARGS='--gear-set mine.yaml --gear wide'; tools/cad.py --help)
 	$(say) 'cad: models of cad/ with the numbers of the gear file'
 	@$(BIN)/python tools/cad.py $(CAD_ARGS)
+
+##@ To give away
+
+.PHONY: wheel
+wheel: setup-dev toolchain ## wheels in build/wheels that need no compiler: for this processor, and for aarch64
+	@tools/apt_install.sh aarch64-linux-gnu-gcc:gcc-aarch64-linux-gnu :libc6-dev-arm64-cross
+	$(say) 'wheel: compiling and packing'
+	@JOBS=$(JOBS) $(BIN)/python tools/wheel.py
+	@JOBS=$(JOBS) $(BIN)/python tools/wheel.py --machine aarch64
+
+.PHONY: test-wheel
+test-wheel: setup-dev build ## the wheels in fresh environments without compiler and repository; aarch64 under qemu-user (WHEEL_ARGS='--python python3.13')
+	@tools/apt_install.sh aarch64-linux-gnu-gcc:gcc-aarch64-linux-gnu :libc6-dev-arm64-cross qemu-aarch64:qemu-user
+	$(say) 'test-wheel: installed, and used'
+	@$(BIN)/python tools/test_wheel.py $(WHEEL_ARGS)
+	$(say) 'test-wheel: aarch64, emulated'
+	@$(BIN)/python tools/test_wheel.py --machine aarch64
 
 ##@ The vehicle's processor
 

@@ -9,8 +9,9 @@ CLANG   ?= clang-14
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
 # sse2 and avx2 are the release held to registers of 128 and 256 bits
-FLAVOURS           := release O0 san sse2 avx2 clang clang-O0 fuzz
+FLAVOURS           := release O0 san sse2 avx2 clang clang-O0 fuzz aarch64
 OPTIMISE_release   := -O3 -fno-semantic-interposition
+OPTIMISE_aarch64   := $(OPTIMISE_release)
 OPTIMISE_O0        := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
 OPTIMISE_sse2      := -O3 -DIVL_SIM_WIDEST_BITS=128
@@ -21,7 +22,7 @@ OPTIMISE_fuzz      := -O2 -g -fno-omit-frame-pointer $(SANITIZE)
 ifeq ($(filter $(FLAVOUR),$(FLAVOURS)),)
 $(error FLAVOUR=$(FLAVOUR) is not one of: $(FLAVOURS))
 endif
-COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(CC))
+COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(if $(filter aarch64,$(FLAVOUR)),aarch64-linux-gnu-gcc,$(CC)))
 
 WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror

@@ -26,6 +26,7 @@ from ivl.cli import (
     flash,
     flight,
     fly,
+    init,
     learn,
     listing,
     mocap,
@@ -72,6 +73,8 @@ app.command("figs", help=figs.HELP, short_help="Draw the paper's figures 4 to 9 
 app.command("export", help=export.HELP, short_help="Write a landing as MCAP, CSV or .rrd.")(export.export)
 app.command("estimate", help=estimate.HELP, short_help="Show how well the core knows its distance.")(estimate.estimate)
 app.command("list", help=listing.HELP)(listing.list_)
+app.command("init", help=init.HELP, short_help="Write a new experiment with comments.")(init.init)
+app.command("schema", help=init.SCHEMA_HELP, short_help="Print the schema of a kind of file, for editors.")(init.schema)
 app.command("bench", help=bench.HELP)(bench.bench)
 app.command("sil", help=sil.HELP)(sil.sil)
 app.command("fly", help=fly.HELP, short_help="Fly one landing with a vehicle.")(fly.fly)
