@@ -93,6 +93,12 @@ test-wheel: setup-dev build ## the wheels in fresh environments without compiler
 	$(say) 'test-wheel: aarch64, emulated'
 	@$(BIN)/python tools/test_wheel.py --machine aarch64
 
+.PHONY: example-cpp
+example-cpp: toolchain ## the flight core in a bare C loop and in a C++ module, compiled and flown (docs/PORTING.md)
+	@tools/apt_install.sh g++:g++
+	$(say) 'example-cpp: examples'
+	@+$(NATIVE) FLAVOUR=O0 examples
+
 ##@ The vehicle's processor
 
 .PHONY: firmware
@@ -155,7 +161,7 @@ test: setup-dev toolchain cross-toolchain chromium qt-libraries lint test-c san 
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
-test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator (Unity)
+test-c: toolchain $(UNITY)/unity.c example-cpp ## unit tests of firmware core and simulator (Unity), and the examples in C and C++
 	$(say) 'test-c: C tests, strict warnings as errors'
 	@+$(NATIVE) FLAVOUR=release check
 	$(say) 'test-c: Crazyflie app on a stand-in for its SDK, ASan and UBSan'
@@ -363,7 +369,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
 
 # set-up, each step once
 

@@ -88,7 +88,7 @@ FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core lib sil check fuzz FORCE
+.PHONY: core lib sil check examples fuzz FORCE
 
 core: $(CORE)
 
@@ -137,6 +137,22 @@ $(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(BUILD)/un
 $(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(CORE) $(SIM) $(CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+
+# the core as other firmware compiles it: in C, and in C++ with the headers of a system
+EXAMPLES := $(BUILD)/examples/bare_loop $(BUILD)/examples/autopilot
+
+examples: $(EXAMPLES)
+	@for program in $(EXAMPLES); do echo "  FLY   $$program"; $$program || exit 1; done
+
+$(BUILD)/examples/bare_loop: examples/bare_loop.c examples/planar.h $(CORE)
+	@echo '  LINK  $@'
+	@mkdir -p $(@D)
+	@$(COMPILER) -std=c11 -Wall -Wextra -pedantic -Wshadow -Werror -ffp-contract=off -Ifirmware/core -o $@ $(filter %.c %.o,$^) -lm
+
+$(BUILD)/examples/autopilot: examples/autopilot.cpp examples/planar.h $(CORE)
+	@echo '  LINK  $@'
+	@mkdir -p $(@D)
+	@$(CXX) -std=c++17 -Wall -Wextra -pedantic -Wshadow -Werror -ffp-contract=off -isystem firmware/core -Iexamples -o $@ $(filter %.cpp %.o,$^) -lm
 
 run-test_%: $(BUILD)/test_% FORCE
 	@tools/run_unity.sh $<
