@@ -1,6 +1,7 @@
 """What helps to find things: lists, new files, schemas, and the landing that a run recommends."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -82,3 +83,13 @@ def test_what_a_run_learned_is_flown(small: ivl.Experiment, tmp_path: Path, caps
     assert first.startswith("verdict")
     assert cli.run(["rollout", "--run", str(folder), "--rrev", "4"]) == 2
     assert "already given by --rrev" in capsys.readouterr().err
+
+
+def test_a_command_whose_packages_are_missing_says_what_installs_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "pyarrow" or name.startswith("ivl.sweep.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert cli.run(["sweep", "smoke", "--dry-run"]) == 1
+    assert "pyarrow is not installed: pip install 'ivl[sweep]'" in capsys.readouterr().err

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from ivl import __version__, files
+from ivl import __version__, files, optional
 from ivl.cli import (
     amend,
     bench,
@@ -111,6 +111,11 @@ def run(arguments: list[str] | None = None) -> int:
         return _fail(f"{error.format_message().replace('Value error, ', '')} (try `{command} --help`)", 2)
     except (KeyboardInterrupt, typer.Abort):
         return 130
+    except ModuleNotFoundError as error:
+        advice = optional.hint(error)
+        if advice is None:
+            raise
+        return _fail(advice, 1)
     except BrokenPipeError:
         return 1  # whoever read the output has gone, as `head` does: nobody is left to tell
     except OSError as error:
