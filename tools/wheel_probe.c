@@ -46,7 +46,7 @@ int main(int argc, char **argv)
     }
     void *outcomes = calloc(n, item_size);
     FILE *file = fopen(argv[4], "wb");
-    if (outcomes == NULL || file == NULL || ivl_sil_rollouts(model, read_all(argv[2]), n, 2, outcomes) != 0)
+    if (outcomes == NULL || file == NULL || ivl_sil_rollouts(model, read_all(argv[2]), n, 2, outcomes, NULL) != 0)
     {
         perror(argv[4]);
         return 1;

@@ -5,7 +5,6 @@ from typing import Any
 
 from ivl.errors import MissingError
 
-
 EXTRAS = {
     "pyarrow": "sweep", "pandas": "sweep", "xarray": "sweep", "dask": "sweep", "distributed": "sweep",
     "cryptography": "sweep", "dask_jobqueue": "cluster", "plotly": "report", "mcap": "report", "rerun": "rerun",
