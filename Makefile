@@ -2,7 +2,7 @@
 #
 # This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
 # Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS, VEHICLE, GEAR, SIL_ARGS,
-# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS.
+# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS, WHEEL_ARGS.
 
 PYTHON     ?= python3
 CLANG      ?= clang-14
@@ -79,6 +79,29 @@ cad: setup build openscad ## legs and jigs to print, as STL in build/cad (CAD_AR
 	$(say) 'cad: models of cad/ with the numbers of the gear file'
 	@$(BIN)/python tools/cad.py $(CAD_ARGS)
 
+##@ To give away
+
+.PHONY: wheel
+wheel: setup-dev toolchain ## wheels in build/wheels that need no compiler: for this processor, and for aarch64
+	@tools/apt_install.sh aarch64-linux-gnu-gcc:gcc-aarch64-linux-gnu :libc6-dev-arm64-cross
+	$(say) 'wheel: compiling and packing'
+	@JOBS=$(JOBS) $(BIN)/python tools/wheel.py
+	@JOBS=$(JOBS) $(BIN)/python tools/wheel.py --machine aarch64
+
+.PHONY: test-wheel
+test-wheel: setup-dev build ## the wheels in fresh environments without compiler and repository; aarch64 under qemu-user (WHEEL_ARGS='--python python3.13')
+	@tools/apt_install.sh aarch64-linux-gnu-gcc:gcc-aarch64-linux-gnu :libc6-dev-arm64-cross qemu-aarch64:qemu-user
+	$(say) 'test-wheel: installed, and used'
+	@$(BIN)/python tools/test_wheel.py $(WHEEL_ARGS)
+	$(say) 'test-wheel: aarch64, emulated'
+	@$(BIN)/python tools/test_wheel.py --machine aarch64
+
+.PHONY: example-cpp
+example-cpp: toolchain ## the flight core in a bare C loop and in a C++ module, compiled and flown (docs/PORTING.md)
+	@tools/apt_install.sh g++:g++
+	$(say) 'example-cpp: examples'
+	@+$(NATIVE) FLAVOUR=O0 examples
+
 ##@ The vehicle's processor
 
 .PHONY: firmware
@@ -144,7 +167,7 @@ test: ## everything below, set-up and compilers included
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
-test-c: toolchain build $(UNITY)/unity.c ## unit tests of firmware core and simulator (Unity)
+test-c: toolchain build $(UNITY)/unity.c example-cpp ## unit tests of firmware core and simulator (Unity), and the examples in C and C++
 	$(say) 'test-c: C tests, strict warnings as errors'
 	@+$(NATIVE) FLAVOUR=release check
 	$(say) 'test-c: Crazyflie app on a stand-in for its SDK, ASan and UBSan'
@@ -365,7 +388,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
 
 # set-up, each step once
 
@@ -381,7 +404,7 @@ $(VENV)/.stamp-run: $(BIN)/python pyproject.toml tools/constraints.txt
 # what is needed to run is a part of it, and is not installed twice
 $(VENV)/.stamp-dev: $(BIN)/python pyproject.toml tools/constraints.txt
 	$(say) 'setup: installing ivl and what it, its tests and lint need'
-	@$(pip) --editable '.[link,sweep,report,live,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
+	@$(pip) --editable '.[link,sweep,report,live,gym,optimisers,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
 	@touch $(VENV)/.stamp-run $@
 
 $(UNITY)/unity.c: tools/get_unity.sh tools/unity.txt | $(BIN)/python

@@ -10,8 +10,9 @@ CLANG   ?= clang-14
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
 # the tests of `shared` link the product as libraries, so that a changed source costs one link and not one for each test
-FLAVOURS           := release O0 shared san clang clang-O0 fuzz
+FLAVOURS           := release O0 shared san clang clang-O0 fuzz aarch64
 OPTIMISE_release   := -O3 -fno-semantic-interposition
+OPTIMISE_aarch64   := $(OPTIMISE_release)
 OPTIMISE_O0        := -O0
 OPTIMISE_shared    := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
@@ -21,7 +22,7 @@ OPTIMISE_fuzz      := -O2 -g -fno-omit-frame-pointer $(SANITIZE)
 ifeq ($(filter $(FLAVOUR),$(FLAVOURS)),)
 $(error FLAVOUR=$(FLAVOUR) is not one of: $(FLAVOURS))
 endif
-COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(CC))
+COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(if $(filter aarch64,$(FLAVOUR)),aarch64-linux-gnu-gcc,$(CC)))
 
 WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
@@ -123,7 +124,7 @@ TIMEOUT_S ?= 14400
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core lib sil check fuzz sequences FORCE
+.PHONY: core lib sil check examples fuzz sequences FORCE
 
 core: $(CORE)
 
@@ -198,6 +199,22 @@ $(BUILD)/libtested_cf.so: $(CF)
 
 $(BUILD)/libtested_crtp.so: $(CRTP)
 	$(link_tested)
+
+# the core as other firmware compiles it: in C, and in C++ with the headers of a system
+EXAMPLES := $(BUILD)/examples/bare_loop $(BUILD)/examples/autopilot
+
+examples: $(EXAMPLES)
+	@for program in $(EXAMPLES); do echo "  FLY   $$program"; $$program || exit 1; done
+
+$(BUILD)/examples/bare_loop: examples/bare_loop.c examples/planar.h $(CORE)
+	@echo '  LINK  $@'
+	@mkdir -p $(@D)
+	@$(COMPILER) -std=c11 -Wall -Wextra -pedantic -Wshadow -Werror -ffp-contract=off -Ifirmware/core -o $@ $(filter %.c %.o,$^) -lm
+
+$(BUILD)/examples/autopilot: examples/autopilot.cpp examples/planar.h $(CORE)
+	@echo '  LINK  $@'
+	@mkdir -p $(@D)
+	@$(CXX) -std=c++17 -Wall -Wextra -pedantic -Wshadow -Werror -ffp-contract=off -isystem firmware/core -Iexamples -o $@ $(filter %.cpp %.o,$^) -lm
 
 run-test_%: $(BUILD)/test_% FORCE
 	@tools/run_unity.sh $<

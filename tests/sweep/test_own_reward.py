@@ -109,7 +109,7 @@ def test_a_reward_whose_terms_changed_is_not_resumed(
 def test_the_command_line_knows_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["list", "rewards", "--json"]) == 0
     (entry,) = (e for e in json.loads(capsys.readouterr().out)["rewards"] if e["name"] == "feet")
-    assert entry["options"] == {"per_foot": 0.001}
+    assert entry["options"] == {"weights": {}, "per_foot": 0.001}
     assert entry["terms"]["time_s"] == {"unit": "s", "doc": "time of flight"}
 
 
