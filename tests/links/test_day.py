@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ivl import cli, yamlfile
+from ivl import cli, files, yamlfile
 from ivl.links import preflight
 from ivl.site import file as site_file
 
@@ -20,7 +20,7 @@ GRID = [
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working directory with a site file as `ivl site new` writes it."""
     monkeypatch.chdir(tmp_path)
-    site_file.write_new(tmp_path / "lab.yaml")
+    files.write_new(tmp_path / "lab.yaml", site_file.TEMPLATE.read_bytes())
     return tmp_path
 
 
