@@ -75,6 +75,12 @@ def test_a_day_is_rehearsed_stopped_and_resumed(folder: Path, capsys: pytest.Cap
 
 
 @pytest.mark.usefixtures("folder")
+def test_a_rehearsed_day_has_cameras_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert learn([], "--mocap", "simulator") == 2
+    assert "a rehearsed day has cameras of its own: leave --mocap out" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
 def test_answers_from_a_file_are_for_rehearsals_alone(capsys: pytest.CaptureFixture[str]) -> None:
     Path("answers.txt").write_text("fly 1")
     for words in (["--uri", "udp://127.0.0.1:9"], []):
