@@ -19,7 +19,7 @@ export CC CLANG
 VENV   := .venv
 BIN    := $(VENV)/bin
 UNITY  := build/unity
-GOLDEN := release O0 sse2 avx2 clang clang-O0
+GOLDEN := release O0 clang clang-O0
 STM32  := stm32-Os stm32-O2 stm32-clang
 # a -j given by the user is passed on; without one the C code is compiled on all cores
 SUBMAKE = $(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS)) -Otarget
@@ -150,6 +150,8 @@ test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator 
 san: toolchain setup-dev $(UNITY)/unity.c ## the same C tests, and landings, under AddressSanitizer and UndefinedBehaviorSanitizer
 	$(say) 'san: C tests under ASan and UBSan'
 	@+$(NATIVE) FLAVOUR=san check lib
+	$(say) 'san: random sequences for the server of the software vehicle'
+	@+$(NATIVE) FLAVOUR=san sequences
 	$(say) 'san: landings under ASan and UBSan'
 	@LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0 IVL_NATIVE_LIBRARY=build/san/libivl_sil.so \
 	    $(BIN)/python -m pytest -p no:cacheprovider -m 'not slow' tests/physics $(PYTEST_ARGS)
@@ -210,12 +212,14 @@ test-mutants: setup-dev build toolchain $(UNITY)/unity.c ## a few of these fault
 	@$(within) $(BIN)/python tools/mutants.py --only wire --only mocap --scale 0.07
 
 .PHONY: sequences
-sequences: toolchain $(UNITY)/unity.c ## random sequences of host, link and vehicle for the app (SEQUENCES=100000 SEED=1)
-	@+$(APP) sequences SEQUENCES=$(or $(SEQUENCES),100000) SEED=$(or $(SEED),1)
+sequences: toolchain $(UNITY)/unity.c ## random sequences for the app, and for the software vehicle's server (SEQUENCES=20000 SEED=1)
+	@+$(APP) sequences SEQUENCES=$(or $(SEQUENCES),20000) SEED=$(or $(SEED),1)
+	@+$(NATIVE) FLAVOUR=san sequences SEQUENCES=$(or $(SEQUENCES),20000) SEED=$(or $(SEED),1)
 
 .PHONY: reliability
 reliability: setup-dev build toolchain $(UNITY)/unity.c ## damaged files, failing disks, hostile packets, links that lose and restart; writes docs/RELIABILITY.md (an hour)
 	@+$(APP) build/app/sequences
+	@+$(NATIVE) FLAVOUR=san build/san/loop_sequences
 	@tools/apt_install.sh $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
 	@+$(NATIVE) FLAVOUR=fuzz fuzz
 	@$(BIN)/python tools/packets.py

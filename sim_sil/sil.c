@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "sim_width.h"
 #include "world_hover.h"
 #include "world_replay.h"
 #include "world_rollout.h"
@@ -105,6 +106,11 @@ int ivl_sil_abi_version(void)
     return IVL_SIL_ABI_VERSION;
 }
 
+int ivl_sil_register_bits(int bits)
+{
+    return (bits == -1 || ivl_sim_width_use(bits)) ? 64 * ivl_sim_width_lanes() : 0;
+}
+
 const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *item_size)
 {
     if (table < 0 || table >= IVL_SIL_TABLE_COUNT)
@@ -200,6 +206,7 @@ typedef struct
     ivl_sim_outcome_t     *outcomes;
     size_t                 n;
     atomic_size_t          next;
+    atomic_ullong          offered, used;  // evaluations: see ivl_sim_work_t
 } batch_t;
 
 static bool next_of_batch(void *context, ivl_sim_job_t *job)
@@ -216,24 +223,28 @@ static bool next_of_batch(void *context, ivl_sim_job_t *job)
 
 static void *fly_batch(void *argument)
 {
-    batch_t *batch = argument;
-    ivl_sim_fly(batch->model, next_of_batch, batch);
+    batch_t             *batch = argument;
+    const ivl_sim_work_t work = ivl_sim_fly(batch->model, next_of_batch, batch);
+    atomic_fetch_add(&batch->offered, work.offered);
+    atomic_fetch_add(&batch->used, work.used);
     return NULL;
 }
 
 static int thread_count(int asked, size_t n)
 {
     long         threads = (asked > 0) ? asked : sysconf(_SC_NPROCESSORS_ONLN);
-    const size_t groups = (n + IVL_SIM_LANES - 1) / IVL_SIM_LANES;
+    const size_t lanes = (size_t)ivl_sim_width_lanes(), groups = (n + lanes - 1) / lanes;
     threads = (threads < 1) ? 1 : ((threads > THREADS_MAX) ? THREADS_MAX : threads);
     return ((size_t)threads > groups) ? (int)((groups > 0) ? groups : 1) : (int)threads;
 }
 
-int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes)
+int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes, uint64_t work[2])
 {
     batch_t   batch = {.model = model, .specs = specs, .outcomes = outcomes, .n = n};
     pthread_t thread[THREADS_MAX];
     atomic_init(&batch.next, 0);
+    atomic_init(&batch.offered, 0);
+    atomic_init(&batch.used, 0);
     const int extra = thread_count(n_threads, n) - 1;
     int       started = 0;
     while (started < extra && pthread_create(&thread[started], NULL, fly_batch, &batch) == 0)
@@ -244,6 +255,11 @@ int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threa
     for (int i = 0; i < started; i++)
     {
         pthread_join(thread[i], NULL);
+    }
+    if (work != NULL)
+    {
+        work[0] = atomic_load(&batch.offered);
+        work[1] = atomic_load(&batch.used);
     }
     return 0;
 }

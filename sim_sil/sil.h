@@ -37,10 +37,15 @@ typedef enum
 
 enum
 {
-    IVL_SIL_ABI_VERSION = 2
+    IVL_SIL_ABI_VERSION = 3
 };
 
 int ivl_sil_abi_version(void);
+
+/// Chooses the registers in which rollouts stand side by side; their bits do not depend on it.  Holds for every thread of the process.
+/// @param[in] bits  128, 256 or 512; 0: the widest that the machine has, as at the start; -1: no change
+/// @return their width, 0 with nothing changed if the machine has none of the width that was asked for
+int ivl_sil_register_bits(int bits);
 
 /// Fields of a table, NULL if there is no such table.
 const ivl_sil_field_t *ivl_sil_table(int table, uint32_t *n_fields, uint32_t *item_size);
@@ -56,8 +61,9 @@ void  ivl_sil_model_surface(const void *model, void *surface);
 void ivl_sil_surface_forward(const void *surface, double forward_W[3]);
 
 /// Flies n landings on n_threads threads (0: as many as the machine has cores).  Each outcome depends on its spec alone.
+/// @param[out] work  evaluations of the forces that the lanes could have made, and those that the landings asked for; may be NULL
 /// @return 0
-int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes);
+int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes, uint64_t work[2]);
 
 /// One landing with its time series; rows beyond the capacity are counted, not written.
 /// @return rows that the landing has; -1 if the period is not positive

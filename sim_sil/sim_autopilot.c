@@ -61,29 +61,44 @@ float ivl_sim_motor_N(const ivl_sim_model_t *model, float norm, float max_N, flo
     return (made_N < idle_N) ? idle_N : made_N;
 }
 
-void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, const ivl_in_t *sensed, ivl_sim_autopilot_t *autopilot,
-                            ivl_state_t *firmware, ivl_out_t *out)
+bool ivl_sim_autopilot_decide(const ivl_sim_model_t *model, void *port, int lane, const ivl_in_t *sensed, ivl_sim_autopilot_t *autopilot,
+                              ivl_state_t *firmware, ivl_out_t *out, ivl_reference_t *ref)
 {
-    const int    n_loop = (model->tick_s * LOOP_HZ > 1.5) ? (int)(model->tick_s * LOOP_HZ + 0.5) : 1;
-    const float  loop_s = (float)(model->tick_s / n_loop), max_N = model->firmware.motor_thrust_N_max;
-    ivl_in_t    *in = &autopilot->in;
-    sensorData_t sensors;
-    state_t      state;
+    const ivl_sim_core_t *core = &model->core;
+    const int             n_loop = (model->tick_s * LOOP_HZ > 1.5) ? (int)(model->tick_s * LOOP_HZ + 0.5) : 1;
+    const float           loop_s = (float)(model->tick_s / n_loop);
+    ivl_in_t             *in = &autopilot->in;
+    bool                  follows = false;
+    sensorData_t          sensors;
+    state_t               state;
     ivl_sim_sdk_of(&autopilot->told, sensed, &sensors, &state);
     in->cmd = sensed->cmd;
     in->rrev = sensed->rrev;
     in->flow = sensed->flow;
     app_sense_motion(&autopilot->senses, &sensors, &state, firmware->phase, loop_s, sensed->t_us, in);
     app_sense_range(&autopilot->senses, ivl_sim_sdk_range_mm(&sensed->range), sensed->t_us, &in->range);
-    model->core.step(port, lane, &model->firmware, firmware, in, out);
-    const float idle_N = app_stops_motors(out) ? 0.0f : (float)model->raw.rotor_thrust_idle_N;
-    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    if (core->decide != NULL)
     {
-        out->thrust_N[i] = ivl_sim_motor_N(model, out->thrust_N[i] / max_N, max_N, idle_N);
+        follows = core->decide(port, lane, &model->firmware, firmware, in, out, ref);
+    }
+    else
+    {
+        core->step(port, lane, &model->firmware, firmware, in, out);
     }
     // the controller is called more often than the core, and carries the attitude on with the gyro that it has
     for (int i = 1; i < n_loop; i++)
     {
         app_sense_attitude(&autopilot->senses, &sensors, &state, firmware->phase, loop_s);
+    }
+    return follows;
+}
+
+void ivl_sim_autopilot_drive(const ivl_sim_model_t *model, ivl_out_t *out)
+{
+    const float max_N = model->firmware.motor_thrust_N_max;
+    const float idle_N = app_stops_motors(out) ? 0.0f : (float)model->raw.rotor_thrust_idle_N;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        out->thrust_N[i] = ivl_sim_motor_N(model, out->thrust_N[i] / max_N, max_N, idle_N);
     }
 }

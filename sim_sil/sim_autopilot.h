@@ -40,10 +40,15 @@ float ivl_sim_sdk_range_mm(const ivl_reading_t *range);
 /// @param[in] idle_N  thrust of a motor of which nothing is asked
 float ivl_sim_motor_N(const ivl_sim_model_t *model, float norm, float max_N, float idle_N);
 
-/// One tick of the core in lane `lane` of a port, on what the sensors say.
+/// One tick of the core in lane `lane` of a port, on what the sensors say, up to the tracking controller if the core can be halted there.
 /// @param[in] sensed  with the command to the core
-/// @param[out] out    its motor thrusts are what the motors are given
-void ivl_sim_autopilot_step(const ivl_sim_model_t *model, void *port, int lane, const ivl_in_t *sensed, ivl_sim_autopilot_t *autopilot,
-                            ivl_state_t *firmware, ivl_out_t *out);
+/// @param[out] ref    what the controller is to follow, if the result is true
+/// @return false: out->thrust_N is complete
+bool ivl_sim_autopilot_decide(const ivl_sim_model_t *model, void *port, int lane, const ivl_in_t *sensed, ivl_sim_autopilot_t *autopilot,
+                              ivl_state_t *firmware, ivl_out_t *out, ivl_reference_t *ref);
+
+/// The end of that tick.
+/// @param[in,out] out  its motor thrusts become what the motors are given
+void ivl_sim_autopilot_drive(const ivl_sim_model_t *model, ivl_out_t *out);
 
 #endif  // IVL_SIM_AUTOPILOT_H

@@ -29,4 +29,11 @@ static void step(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state,
     ivl_step(cfg, state, in, out);
 }
 
-const ivl_sim_core_t ivl_sim_core_linked = {.open = open_port, .close = close_port, .init = init, .commit = commit, .step = step};
+static bool decide(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_reference_t *ref)
+{
+    (void)port, (void)lane;
+    return ivl_step_decide(cfg, state, in, out, ref);
+}
+
+const ivl_sim_core_t ivl_sim_core_linked = {
+    .open = open_port, .close = close_port, .init = init, .commit = commit, .step = step, .decide = decide};

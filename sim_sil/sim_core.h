@@ -15,6 +15,10 @@ typedef struct
     void (*init)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state);
     ivl_status_t (*commit)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_policy_t *policy);
     void (*step)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out);
+    /// A step up to the tracking controller, see ivl_step_decide: the world computes the thrusts of all lanes at once, and has no use for the
+    /// rest.  NULL: this core does whole steps only.
+    bool (*decide)(void *port, int lane, const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out,
+                   ivl_reference_t *ref);
     bool every_tick;  ///< false: ticks are left out while the core's motors are latched off, when they decide nothing
     /// True: there is an autopilot around the core, which gets what the sensors say and drives the motors.  False: the world takes its place
     /// (sim_autopilot.h).

@@ -14,7 +14,7 @@ ifneq ($(FORMS),)
 FORMS_SOURCES := $(wildcard $(FORMS)/*.c)
 FORMS_FLAGS   := -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
 endif
-HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h firmware/sdk/*.h $(if $(FORMS),$(FORMS)/*.h))
+HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h tests/fuzz/*.h firmware/sdk/*.h $(if $(FORMS),$(FORMS)/*.h))
 
 # ---- host: sanitizers on, strict warnings on our own files
 

@@ -1,6 +1,7 @@
 """Compare the bits of reference landings across compilers, optimisation levels, register widths and thread counts.
 
-Each library given is loaded in a process of its own and flies the same landings. What they computed must be equal, and
+Each library given is loaded in processes of their own and flies the same landings, in registers of every width that
+this machine has. What they computed must be equal, and
 equal to the reference in tests/golden/landings.txt, which changes with the physics: in its own commit, with the reason.
 
 usage: golden.py [--update] LIBRARY...
@@ -15,7 +16,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-THREADS = (1, 2, 5)
+RUNS = ((0, 1), (0, 2), (0, 5), (256, 2), (128, 1))  # bits of the registers, 0: the widest; threads
 STREAMS = 9  # one more than the library flies side by side
 REFERENCE = Path(__file__).parent.parent / "tests" / "golden" / "landings.txt"
 
@@ -104,13 +105,20 @@ def report(threads: int) -> str:
     return "".join(fly(name, threads) + "\n" for name in CASES)
 
 
-def report_of(library: Path, threads: int) -> str:
+def widest() -> int:
+    """Bits of this machine's widest registers."""
+    from ivl import native
+
+    return native.library().use_registers()
+
+
+def report_of(library: Path, bits: int, threads: int) -> str:
     """The lines of all cases as that library computes them, from a process of its own; raise if it fails."""
-    environment = dict(os.environ, IVL_NATIVE_LIBRARY=str(library.resolve()))
+    environment = dict(os.environ, IVL_NATIVE_LIBRARY=str(library.resolve()), IVL_REGISTER_BITS=str(bits))
     command = [sys.executable, str(Path(__file__).resolve()), "--fly", str(threads)]
     run = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     if run.returncode != 0 or not run.stdout:
-        raise RuntimeError(f"{library}, {threads} threads: exit code {run.returncode}\n{run.stderr}")
+        raise RuntimeError(f"{library}, {bits} bits, {threads} threads: exit code {run.returncode}\n{run.stderr}")
     return run.stdout
 
 
@@ -137,13 +145,17 @@ def main() -> int:
         return 0
     if not args.libraries:
         parser.error("no library given")
-    reports = {(path, n): report_of(path, n) for path in args.libraries for n in THREADS}
+    runs = [(path, bits, threads) for path in args.libraries for bits, threads in RUNS if bits <= widest()]
+    reports = {run: report_of(*run) for run in runs}
     first = next(iter(reports.values()))
     if not args.update and not REFERENCE.exists():
         print(f"error: {REFERENCE} does not exist; make golden-update writes it", file=sys.stderr)
         return 1
     expected = first if args.update else REFERENCE.read_text(encoding="ascii")
-    bad = sum(differences(expected, found, f"{path.parent.name}, {n} threads") for (path, n), found in reports.items())
+    bad = sum(
+        differences(expected, found, f"{path.parent.name}, {f'{bits} bits' if bits else 'widest'}, {threads} threads")
+        for (path, bits, threads), found in reports.items()
+    )
     if bad:
         print("error: the landings changed; if that is meant: make golden-update, and commit it alone", file=sys.stderr)
         return 1

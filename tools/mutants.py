@@ -1,26 +1,33 @@
 """Put small faults into the product, one at a time, and ask the quick tests of that place whether they notice.
 
 Run by `make mutants`; writes its table of docs/RELIABILITY.md. `--scale 0.02` tries a fiftieth of them, and writes
-nothing. Each fault is put into a copy of the tree and built by the project's own makefiles, so that what is tested is
-what is built. A fault that does not compile, or that gives the same program, is none. Those that were looked at and
-change nothing that anybody could see stand in tools/mutants_equal.txt, each with its reason.
+nothing. Each fault is put into a copy of the tree and built by the commands of the project's own makefiles, so that
+what is tested is what is built. The C tests link the product as libraries: a fault costs one compilation, one link and
+the tests up to the first that fails, those first that found faults of that source before. A fault that does not
+compile, or that gives the same program, is none. Those that were looked at and change nothing that anybody could see
+stand in tools/mutants_equal.txt, each with its reason.
 
-Verdicts are kept in build/mutants-kept.jsonl, so that a run that was ended goes on where it was. A kept verdict counts
-as long as neither the source nor the test that found the fault has changed; what was not found is always tried again.
+Verdicts are kept in build/mutants-kept.jsonl, or where `--kept` says, so that a run that was ended goes on where it
+was. A kept verdict counts as long as neither the source nor the test that found the fault has changed; what was not
+found is always tried again.
 """
 
 import argparse
+import functools
 import hashlib
 import json
 import math
 import os
 import resource
+import shlex
 import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,15 +49,19 @@ EQUAL = ROOT / "tools" / "mutants_equal.txt"
 BEGIN, END = "<!-- measured by tools/mutants.py: begin -->", "<!-- measured by tools/mutants.py: end -->"
 TREE = ROOT / "build" / "mutants"
 KEPT = ROOT / "build" / "mutants-kept.jsonl"
-FLAVOUR = "O0"
-"""Compiled and linked soonest."""
+DIRTY = TREE / "dirty.txt"
+"""Names the source that has a fault; what was made of it is made anew if a run was ended meanwhile."""
+FLAVOUR = "shared"
+LIBRARIES = [f"build/{FLAVOUR}/{name}.so" for name in ("libtested", "libtested_cf", "libtested_crtp")]
 TIME_S = 300.0
 """A test that takes longer has noticed: its program waits for what never comes."""
 FOUND, SURVIVED, EQUIVALENT, NONE = "found", "survived", "equivalent", "none"
 QUIET = ["-W", "ignore::pytest.PytestAssertRewriteWarning"]
 """What is loaded before is not rewritten, and need not be."""
-NATIVE = ["make", "--no-print-directory", "-f", "tools/native.mk", f"FLAVOUR={FLAVOUR}", "WARNINGS=-w"]
-APP = ["make", "--no-print-directory", "-f", "tools/app.mk", "CC=gcc -w"]
+MAKE = ["make", "--no-print-directory"]
+NATIVE = ["-f", "tools/native.mk", f"FLAVOUR={FLAVOUR}", "WARNINGS=-w", "CC=gcc"]
+APP = ["-f", "tools/app.mk", "CC=gcc -w"]
+APP_TESTS = {"test_app": ["build/app/test_app"], "sequences": ["build/app/sequences", "500"]}
 
 
 @dataclass(frozen=True)
@@ -78,8 +89,21 @@ LEARNER_TESTS = ("learners", "ephe", "ephe_memory", "cma_learner", "gp", "bo", "
 AREAS = (
     Area("firmware core", ("firmware/core/ivl_*.c",), 130, 0.97, ("test_ivl_*",), ("ivl_guard.c", "ivl_wire.c")),
     Area("guard", ("firmware/core/ivl_guard.c",), 50, 0.97, ("test_ivl_*",)),
-    Area("app", ("firmware/app/app_*.c",), 60, 0.97, ("test_app", "test_cf_*"), ("app_port.c",)),
-    Area("wire", ("firmware/core/ivl_wire.c", "sim_sil/sil_wire.c"), 30, 0.97, ("test_ivl_wire", "test_ivl_parts")),
+    Area(
+        "app",
+        ("firmware/app/app_*.c",),
+        60,
+        0.97,
+        ("test_app", "sequences"),
+        ("app_port.c",),
+    ),
+    Area(
+        "wire",
+        ("firmware/core/ivl_wire.c", "sim_sil/sil_wire.c"),
+        30,
+        0.97,
+        ("test_ivl_wire", "test_ivl_parts", "test_sil_wire"),
+    ),
     Area("crtp", ("sim_sil/crtp/crtp_*.c",), 60, 0.92, ("test_crtp_*",), ("crtp_main.c", "crtp_udp.c")),
     Area(
         "learners", ("host/ivl/learners/*.py",), 50, 0.92, tuple(f"tests/py/test_{name}.py" for name in LEARNER_TESTS)
@@ -135,19 +159,24 @@ def fingerprint(verdict: Verdict) -> str:
     return digest(verdict.mutant.path + verdict.mutant.text + test)
 
 
-def keep(verdict: Verdict) -> None:
+def keep(verdict: Verdict, kept: Path) -> None:
     """Write down what became of a fault."""
     mutant = verdict.mutant
-    names = {"fault": digest(mutant.path + mutant.text), "ending": verdict.ending, "by": verdict.by}
-    with KEPT.open("a", encoding="utf-8") as file:
+    names = {
+        "fault": digest(mutant.path + mutant.text),
+        "ending": verdict.ending,
+        "by": verdict.by,
+        "path": mutant.path,
+    }
+    with kept.open("a", encoding="utf-8") as file:
         file.write(json.dumps({**names, "fingerprint": fingerprint(verdict), "what": str(mutant)}) + "\n")
 
 
-def read_kept() -> dict[str, dict[str, str]]:
+def read_kept(path: Path) -> dict[str, dict[str, str]]:
     """Verdicts of earlier runs by fault, the last of each."""
-    if not KEPT.exists():
+    if not path.exists():
         return {}
-    return {kept["fault"]: kept for kept in map(json.loads, KEPT.read_text(encoding="utf-8").splitlines())}
+    return {kept["fault"]: kept for kept in map(json.loads, path.read_text(encoding="utf-8").splitlines())}
 
 
 def recalled(mutant: Mutant, kept: dict[str, dict[str, str]]) -> Verdict | None:
@@ -228,6 +257,9 @@ def run_pytest(test: str, processor_s: int = int(TIME_S)) -> int:
 
 def copy_tree() -> None:
     """The tree as it is; what was compiled in the copy before is kept, and makefiles compile what has changed since."""
+    if DIRTY.exists():
+        (TREE / DIRTY.read_text(encoding="utf-8")).write_bytes(b"")
+        DIRTY.unlink()
     for name in ("firmware", "sim_sil", "tests", "tools", "host", "build/unity"):
         wanted = {p.relative_to(ROOT) for p in (ROOT / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
         there = {p.relative_to(TREE) for p in (TREE / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
@@ -236,56 +268,100 @@ def copy_tree() -> None:
         for path in wanted:
             if path not in there or (TREE / path).read_bytes() != (ROOT / path).read_bytes():
                 (TREE / path).parent.mkdir(parents=True, exist_ok=True)
-                # as new, so that it is compiled: the fault of a run that was ended may be in its object
+                # as new, so that it is compiled
                 shutil.copy(ROOT / path, TREE / path)
     for name in (FLAVOUR, "app"):
         if (ROOT / "build" / name).is_dir() and not (TREE / "build" / name).exists():
-            shutil.copytree(ROOT / "build" / name, TREE / "build" / name, symlinks=True)
+            shutil.copytree(ROOT / "build" / name, TREE / "build" / name, copy_function=shutil.copy)
     for name in ("pyproject.toml", "Makefile", "docs", "CHANGELOG.md", "README.md"):
         if not (TREE / name).is_symlink():
             (TREE / name).symlink_to(ROOT / name)
 
 
-def programs(area: Area, path: str) -> list[str]:
-    """C test programs of an area, the one of the source's own name first."""
-    stem = Path(path).stem
-    found = sorted(
-        {
-            p.stem
-            for pattern in area.tests
-            for p in [*ROOT.glob(f"tests/c/{pattern}.c"), *ROOT.glob(f"tests/app/{pattern}.c")]
-        },
-        key=lambda name: (not name.endswith(stem), name != "test_app", name == "test_ivl_fuzz", name),
-    )
+def programs(area: Area) -> list[str]:
+    """C test programs of an area; the random ones last."""
+    folders = ("tests/c", "tests/app", "tests/fuzz")
+    found = {p.stem for pattern in area.tests for folder in folders for p in ROOT.glob(f"{folder}/{pattern}.c")}
     if not found:
         raise SystemExit(f"mutants: no test fits {area.tests}")
+    return sorted(found, key=lambda name: (name.endswith("_fuzz"), name))
+
+
+def in_order(tests: list[str], path: str, finders: Counter[tuple[str, str]]) -> list[str]:
+    """The tests of a source: its own first, then those that have found most."""
+    stem = Path(path).stem.split("_", 1)[-1]
+    return sorted(tests, key=lambda test: (stem not in test, -finders[path, Path(test).stem]))
+
+
+def program(test: str) -> list[str]:
+    """The command that runs a C test in the copy."""
+    return APP_TESTS.get(test, [f"build/{FLAVOUR}/{test}"])
+
+
+def build(test: str) -> int:
+    """Build a C test by its makefile."""
+    return run([*MAKE, *(APP if test in APP_TESTS else NATIVE), program(test)[0]])
+
+
+@functools.lru_cache(maxsize=1000)
+def recipe(makefile: tuple[str, ...], path: str, targets: tuple[str, ...]) -> tuple[list[str], list[Path]]:
+    """What make would do after a change of one source: its commands that compile and link, and what they make."""
+    # what FORCE checks at each call, flags and lists of sources, has not changed
+    command = [*MAKE, *makefile, "--dry-run", "-o", "FORCE", "-W", path, *targets]
+    done = subprocess.run(command, cwd=TREE, capture_output=True, text=True, check=True)
+    commands = [line for line in done.stdout.splitlines() if line.startswith("gcc ")]
+    words = [shlex.split(command) for command in commands]
+    return commands, [TREE / line[line.index("-o") + 1] for line in words]
+
+
+def recipes(area: Area, path: str) -> dict[str, tuple[list[str], list[Path]]]:
+    """How a source is built again: into the libraries, if a test links them, and into each test of the app."""
+    found = {}
+    if any(test not in APP_TESTS for test in programs(area)):
+        found["libraries"] = recipe(tuple(NATIVE), path, tuple(LIBRARIES))
+    for test in APP_TESTS:
+        if test in area.tests:
+            found[test] = recipe(tuple(APP), path, (program(test)[0],))
     return found
 
 
-def build_of(program: str) -> list[str]:
-    """The command that builds one test program."""
-    return [*APP, f"build/app/{program}"] if program == "test_app" else [*NATIVE, f"build/{FLAVOUR}/{program}"]
+def follow(commands: list[str]) -> bool:
+    """Whether the commands of a recipe succeed."""
+    return run(["sh", "-e", "-c", "\n".join(commands)]) == 0
 
 
-def check_of(program: str) -> list[str]:
-    """The command that builds and runs one test program."""
-    return [*APP, "check"] if program == "test_app" else [*NATIVE, f"run-{program}"]
+@contextmanager
+def with_fault(mutant: Mutant, made: list[Path]) -> Iterator[None]:
+    """Put a fault into the copy, and put back its source and what was made of it."""
+    path, before = TREE / mutant.path, [(file, file.read_bytes()) for file in made]
+    DIRTY.write_text(mutant.path, encoding="utf-8")
+    path.write_text(mutant.text, encoding="utf-8")
+    try:
+        yield
+    finally:
+        shutil.copy(ROOT / mutant.path, path)
+        for file, data in before:
+            file.write_bytes(data)  # newer than the source
+        DIRTY.unlink()
 
 
-def try_c(area: Area, mutant: Mutant, limits: dict[str, int]) -> Verdict:
+def try_c(area: Area, mutant: Mutant, limits: dict[str, int], finders: Counter[tuple[str, str]]) -> Verdict:
     """Compile a fault, and run tests until one fails."""
-    if not is_other_code(mutant):
-        return Verdict(mutant, NONE)
-    for program in programs(area, mutant.path):
-        if run(check_of(program), limits[program]) != 0:
-            return Verdict(mutant, FOUND, program)
-    return Verdict(mutant, SURVIVED)
+    how = recipes(area, mutant.path)
+    with with_fault(mutant, [file for _, made in how.values() for file in made]):
+        if "libraries" in how and not follow(how["libraries"][0]):
+            return Verdict(mutant, NONE)
+        for test in in_order(programs(area), mutant.path, finders):
+            if test in how and not follow(how[test][0]):
+                return Verdict(mutant, NONE)
+            if run(program(test), limits[test]) != 0:
+                return Verdict(mutant, FOUND, test)
+        return Verdict(mutant, SURVIVED if is_other_code(mutant) else NONE)
 
 
 def is_other_code(mutant: Mutant) -> bool:
-    """Whether a fault compiles, and the compiler makes something else of it."""
-    code = [assembly(TREE / mutant.path, mutant.path), assembly(ROOT / mutant.path, mutant.path)]
-    return code[0] is not None and code[0] != code[1]
+    """Whether the compiler makes something else of a fault."""
+    return assembly(TREE / mutant.path, mutant.path) != assembly(ROOT / mutant.path, mutant.path)
 
 
 def assembly(path: Path, place: str) -> bytes | None:
@@ -318,46 +394,36 @@ def assembly(path: Path, place: str) -> bytes | None:
     return done.stdout if done.returncode == 0 else None
 
 
-def try_python(area: Area, mutant: Mutant, source: str, limits: dict[str, int]) -> Verdict:
-    """Run tests on a fault until one fails, those that name the module first."""
-    if not is_other_program(source, mutant.text):
+def try_python(area: Area, mutant: Mutant, limits: dict[str, int], finders: Counter[tuple[str, str]]) -> Verdict:
+    """Run tests on a fault until one fails."""
+    if not is_other_program((ROOT / mutant.path).read_text(encoding="utf-8"), mutant.text):
         return Verdict(mutant, NONE)
-    stem = Path(mutant.path).stem
-    tests = sorted(area.tests, key=lambda name: (stem.split("_")[0] not in name, area.tests.index(name)))
-    for test in tests:
-        if run_pytest(test, limits[test]) != 0:
-            return Verdict(mutant, FOUND, Path(test).stem)
+    with with_fault(mutant, []):
+        for test in in_order(list(area.tests), mutant.path, finders):
+            if run_pytest(test, limits[test]) != 0:
+                return Verdict(mutant, FOUND, Path(test).stem)
     return Verdict(mutant, SURVIVED)
 
 
-def try_one(area: Area, mutant: Mutant, limits: dict[str, int]) -> Verdict:
-    """Put a fault into the copy, ask, and take it out again."""
-    path, original = TREE / mutant.path, ROOT / mutant.path
-    source = original.read_text(encoding="utf-8")
-    path.write_text(mutant.text, encoding="utf-8")
-    try:
-        if path.suffix == ".py":
-            return try_python(area, mutant, source, limits)
-        return try_c(area, mutant, limits)
-    finally:
-        shutil.copy(original, path)
-        # newer than the object that has the fault
-        os.utime(path)
-
-
-def try_area(area: Area, number: int, seed: int, equal: dict[tuple[str, str, str], str]) -> list[Verdict]:
+def try_area(
+    area: Area, number: int, seed: int, equal: dict[tuple[str, str, str], str], kept_path: Path
+) -> list[Verdict]:
     """Verdicts of so many faults that are some."""
-    limits = check_untouched(area)
     verdicts: list[Verdict] = []
-    kept = read_kept()
+    kept = read_kept(kept_path)
+    finders = Counter((earlier["path"], earlier["by"]) for earlier in kept.values() if earlier["by"])
+    limits: dict[str, int] = {}
     for mutant in candidates(area, seed):
         if len(verdicts) >= number:
             break
         began_s = time.monotonic()
         verdict = recalled(mutant, kept)
         if verdict is None:
-            verdict = try_one(area, mutant, limits)
-            keep(verdict)
+            limits = limits or check_untouched(area)
+            attempt = try_c if mutant.path.endswith(".c") else try_python
+            verdict = attempt(area, mutant, limits, finders)
+            keep(verdict, kept_path)
+            finders[mutant.path, verdict.by] += 1
         if verdict.ending == SURVIVED and (mutant.path, mutant.before, mutant.after) in equal:
             verdict = Verdict(mutant, EQUIVALENT)
         if verdict.ending != NONE:
@@ -372,15 +438,14 @@ def check_untouched(area: Area) -> dict[str, int]:
     """Refuse tests that fail without a fault, and measure the others: how many seconds of processor each may take."""
     limits, bad = {}, []
     is_c = sources(area)[0].endswith(".c")
-    for test in programs(area, sources(area)[0]) if is_c else area.tests:
-        if is_c:
-            run(build_of(test))
+    for test in programs(area) if is_c else area.tests:
+        is_built = not is_c or build(test) == 0
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        if (run(check_of(test)) if is_c else run_pytest(test)) != 0:
+        if not is_built or (run(program(test)) if is_c else run_pytest(test)) != 0:
             bad.append(test)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         took_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        limits[test] = 10 + math.ceil(4.0 * took_s)
+        limits[test] = 2 + math.ceil(4.0 * took_s)
     if bad:
         raise SystemExit(f"mutants: without a fault these fail already: {', '.join(bad)}")
     return limits
@@ -416,6 +481,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scale", type=float, default=1.0, help="share of the faults")
     parser.add_argument("--only", action="append", choices=[area.name for area in AREAS], help="this area alone")
+    parser.add_argument("--kept", type=Path, default=KEPT, help="file of verdicts, which a later run goes on from")
     arguments = parser.parse_args()
     areas = [area for area in AREAS if not arguments.only or area.name in arguments.only]
     equal = read_equal()
@@ -423,7 +489,7 @@ def main() -> int:
     results = {}
     for area in areas:
         number = max(round(area.number * arguments.scale), 1)
-        results[area.name] = try_area(area, number, arguments.seed, equal)
+        results[area.name] = try_area(area, number, arguments.seed, equal, arguments.kept)
     text = table(results, arguments.seed)
     print(text)
     for verdict in (v for verdicts in results.values() for v in verdicts if v.ending == SURVIVED):

@@ -1,6 +1,7 @@
 # Compiles firmware core, simulator and C tests.  Called by the Makefile as
 #     make -f tools/native.mk FLAVOUR=<flavour> <target>
-# Targets: core, lib, sil, check, fuzz (flavour fuzz only).  Everything made is in build/<flavour>/.
+# Targets: core, lib, sil, check, sequences (random ones for the server's loop, SEQUENCES of them), fuzz (flavour fuzz only).  Everything made
+# is in build/<flavour>/.
 # Each source is compiled once per flavour; the library and the tests link the same objects.
 
 FLAVOUR ?= release
@@ -8,13 +9,12 @@ CLANG   ?= clang-14
 
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
-# sse2 and avx2 are the release held to registers of 128 and 256 bits
-FLAVOURS           := release O0 san sse2 avx2 clang clang-O0 fuzz
+# the tests of `shared` link the product as libraries, so that a changed source costs one link and not one for each test
+FLAVOURS           := release O0 shared san clang clang-O0 fuzz
 OPTIMISE_release   := -O3 -fno-semantic-interposition
 OPTIMISE_O0        := -O0
+OPTIMISE_shared    := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
-OPTIMISE_sse2      := -O3 -DIVL_SIM_WIDEST_BITS=128
-OPTIMISE_avx2      := -O3 -DIVL_SIM_WIDEST_BITS=256
 OPTIMISE_clang     := -O3
 OPTIMISE_clang-O0  := -O0
 OPTIMISE_fuzz      := -O2 -g -fno-omit-frame-pointer $(SANITIZE)
@@ -26,8 +26,9 @@ COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(CC))
 WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
 
-# no contraction and no -march: the same source gives the same bits on every machine and compiler
-CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -fno-math-errno -fPIC -pthread \
+# no contraction: the same source gives the same bits on every machine and compiler, whatever its instructions
+# the flight core also in halves, for vehicles side by side
+CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -DIVL_SIDE_BY_SIDE -fno-math-errno -fPIC -pthread \
           -Ifirmware/core -Isim_sil -Isim_sil/physics -Isim_sil/world
 LDLIBS := -lm -pthread
 
@@ -35,7 +36,9 @@ LDLIBS := -lm -pthread
 ifneq ($(findstring Free Software Foundation,$(shell $(CC) --version)),)
 LTO_release := -flto -ffat-lto-objects
 LTO_LINK_release := -flto=auto
+COMBINE_release = $(COMPILER) $(CFLAGS) $(LTO_LINK_release) -flinker-output=nolto-rel -nostdlib -r
 endif
+COMBINE = $(or $(COMBINE_$(FLAVOUR)),ld -r)
 
 # further flags of a folder, and of a single object by its name without folder and suffix
 # the simulator passes vectors by value, within one compilation only: the note that their ABI once changed is idle; it has the app's senses
@@ -57,7 +60,7 @@ FLAGS_tests/c := $(FLAGS_unity) $(FLAGS_sim_sil) -Itests/c -Isim_sil/cf -Itests/
 # the link server, and a vehicle that only writes down what it is told, for its tests
 FLAGS_sim_sil/crtp := $(FLAGS_sim_sil)
 FLAGS_tests/crtp   := $(FLAGS_sim_sil)
-FLAGS_tests/fuzz   := $(FLAGS_vehicle)
+FLAGS_tests/fuzz   := $(FLAGS_vehicle) $(FLAGS_unity) -Itests/c
 
 # The fuzzer is guided by the server and the vehicle, not by the physics, which costs time and says little.  Comparisons are followed in the
 # server alone: the vehicle searches its tables by name when it starts.
@@ -73,9 +76,20 @@ CFLAGS += -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
 endif
 
 BUILD   := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
+
+# Physics and world are compiled once more for each wider register: rollouts side by side, and the instructions that act on them.  Each such set is
+# one object, which shows the functions of sim_width.c and hides the rest.
+MACHINE   := $(shell $(COMPILER) -dumpmachine)
+WIDTHS    := $(if $(findstring x86_64,$(MACHINE)),4 8)
+WIDTH_4   := -mavx2
+WIDTH_8   := -mavx512f -mavx512dq -mavx512vl -mprefer-vector-width=512
+SHOWN     := ivl_sim_fly ivl_sim_hover
+WIDE      := $(WIDTHS:%=$(BUILD)/lanes%.o)
+WIDE_PART := $(patsubst %.c,%.o,$(wildcard sim_sil/physics/*.c sim_sil/world/*.c))
+
 CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
 SENSES  := firmware/app/app_senses.c
-SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES))
+SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES)) $(WIDE)
 CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
@@ -85,9 +99,24 @@ SERVER  := host/ivl/_native/ivl_sil
 CRTP    := $(patsubst %.c,$(BUILD)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
 FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
 
+# what the tests link: the objects, or libraries of them, which are found from the root of the repository; a library stands before what it needs
+ifeq ($(FLAVOUR),shared)
+TESTED      := $(BUILD)/libtested.so
+TESTED_CF   := $(BUILD)/libtested_cf.so
+TESTED_CRTP := $(BUILD)/libtested_crtp.so
+else
+TESTED      := $(CORE) $(SIM)
+TESTED_CF   := $(CF)
+TESTED_CRTP := $(CRTP)
+endif
+
+SEQUENCES ?= 300
+SEED      ?= 1
+TIMEOUT_S ?= 14400
+
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core lib sil check fuzz FORCE
+.PHONY: core lib sil check fuzz sequences FORCE
 
 core: $(CORE)
 
@@ -121,21 +150,47 @@ $(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/sim_sil/crtp/crtp_main.o
 
 fuzz: $(BUILD)/fuzz_crtp
 
+sequences: $(BUILD)/loop_sequences
+	@timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED)
+	@if timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED) --traitor > $(BUILD)/loop_traitor.txt; then echo 'error: loop_sequences did not find the traitor' >&2; exit 1; fi
+	@grep -q 'a stranger' $(BUILD)/loop_traitor.txt || { cat $(BUILD)/loop_traitor.txt; exit 1; }
+
+# sockets and clock are the program's own
+$(BUILD)/loop_sequences: $(BUILD)/tests/fuzz/loop_sequences.o $(CORE) $(SIM) $(CF) $(filter-out %/crtp_udp.o,$(CRTP)) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -Wl,--wrap=clock_gettime -Wl,--wrap=ivl_crtp_step -o $@ $(filter %.o,$^) $(LDLIBS)
+
 $(BUILD)/fuzz_crtp: $(BUILD)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(CORE) $(SIM) $(CRTP) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
-	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+define link_test
+@echo '  LINK  $@'
+@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o %.so,$^) $(LDLIBS)
+endef
 
-$(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(CORE) $(SIM) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
-	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(TESTED_CRTP) $(TESTED) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	$(link_test)
 
-$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(CORE) $(SIM) $(CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
-	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o,$^) $(LDLIBS)
+$(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(TESTED) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	$(link_test)
+
+$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(TESTED_CF) $(TESTED) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+	$(link_test)
+
+define link_tested
+@echo '  LINK  $@'
+@$(COMPILER) $(CFLAGS) -shared -o $@ $(filter %.o,$^) $(LDLIBS)
+endef
+
+$(BUILD)/libtested.so: $(CORE) $(SIM)
+	$(link_tested)
+
+$(BUILD)/libtested_cf.so: $(CF)
+	$(link_tested)
+
+$(BUILD)/libtested_crtp.so: $(CRTP)
+	$(link_tested)
 
 run-test_%: $(BUILD)/test_% FORCE
 	@tools/run_unity.sh $<
@@ -143,19 +198,31 @@ run-test_%: $(BUILD)/test_% FORCE
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(<D)) $(FLAGS_$(basename $(@F))) $(WIDTH) -MMD -MP -c -o $@ $<
 endef
 
 $(BUILD)/%.o: %.c $(BUILD)/flags.txt
 	$(compile)
+
+define width
+$(BUILD)/lanes$1/%.o: WIDTH = -DIVL_SIM_LANES=$1 $(WIDTH_$1)
+$(BUILD)/lanes$1/%.o: %.c $(BUILD)/flags.txt
+	$$(compile)
+
+$(BUILD)/lanes$1.o: $(WIDE_PART:%=$(BUILD)/lanes$1/%) $(BUILD)/objects.txt
+	@echo '  LD    $$@'
+	@$(COMBINE) -o $$@ $$(filter %.o,$$^)
+	@objcopy $(SHOWN:%=--keep-global-symbol=%_lanes$1) $$@
+endef
+$(foreach n,$(WIDTHS),$(eval $(call width,$n)))
 
 $(BUILD)/unity.o: WARNINGS :=
 $(BUILD)/unity.o: $(UNITY)/unity.c tools/native.mk
 	$(compile)
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
-ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(LTO_LINK_$(FLAVOUR)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
-ALL_OBJECTS := $(CORE) $(SIM) $(CF) $(CRTP) $(SUPPORT)
+ALL_FLAGS   := $(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(LTO_LINK_$(FLAVOUR)) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_% WIDTH_%,$(.VARIABLES))),$v=$($v))
+ALL_OBJECTS := $(WIDE_PART) $(CORE) $(SIM) $(CF) $(CRTP) $(SUPPORT)
 
 define remember
 @mkdir -p $(@D)
@@ -168,4 +235,5 @@ $(BUILD)/flags.txt: FORCE
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o))
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(BUILD)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o) \
+    $(foreach n,$(WIDTHS),$(WIDE_PART:%=$(BUILD)/lanes$n/%)))

@@ -26,8 +26,11 @@ from ivl import assess, experiment, run
 from ivl.analysis.intervals import wilson
 from ivl.learning.loop import Progress
 from ivl.outcome import four_leg
+from ivl.world import World
 
-AFTER = (1, 2, 4, 8, 24)
+AFTER, MARGIN_AFTER = (1, 2, 4, 8, 24), (4, 24)
+MARGIN_ROLLOUTS = 100
+"""For each of the points that a margin rate is averaged over."""
 OUTSIDE: dict[str, dict[str, float]] = {
     "rotors stop late": {"rotor.tau_down": 1.6},
     "rotors start late": {"rotor.tau_up": 1.6},
@@ -46,6 +49,7 @@ OUTSIDE: dict[str, dict[str, float]] = {
 VALUES = ("leg.foot_damping", "world.sensed_gap_offset", "sense.latency")
 """Given as values: the files have 0, or something near it."""
 _LEAST = 1e-3
+_MARGIN_ENOUGH = 0.95
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -109,11 +113,14 @@ def _drones(result: run.RunResult, threads: int) -> list[dict[str, Any]]:
     """What is told of each drone."""
     chosen, bests = result.experiment, [best["rate_four_leg"] for best in result.summary["best"]]
     worlds = chosen.trial_worlds(len(bests))
-    shares = {}
+    shares: dict[int, list[float]] = {}
+    margins: dict[int, list[float]] = {}
     for n in AFTER:
         if n % chosen.n_rollouts == 0 and n <= chosen.budget:
             rates = assess.rates_after(worlds, chosen, result.history, n // chosen.n_rollouts - 1, threads)
             shares[n] = (rates / np.maximum(bests, _LEAST)).tolist()
+            if n in MARGIN_AFTER and assess.has_margin(chosen):
+                margins[n] = _margins(result, worlds, n, threads)
     last = {row.trial: row.insight for row in result.history}
     landed = [four_leg(result.rollouts.of_trial(k).outcomes).tolist() for k in range(len(bests))]
     return [
@@ -121,10 +128,22 @@ def _drones(result: run.RunResult, threads: int) -> list[dict[str, Any]]:
             "best": best,
             "landed": landed[k],
             "shares": {n: share[k] for n, share in shares.items()},
-            "fits": None if last[k] is None else last[k]["model_fits"],
+            "margin_shares": {n: share[k] for n, share in margins.items()},
+            "fits": (last[k] or {}).get("model_fits"),
         }
         for k, best in enumerate(bests)
     ]
+
+
+def _margins(result: run.RunResult, worlds: list[World], n: int, threads: int) -> list[float]:
+    """Margin rates of what is recommended after n flights, as shares of the largest of each drone."""
+    recommended = {row.trial: row.recommended for row in result.history if row.episode == n - 1}
+    shares = []
+    for k, (world, best) in enumerate(zip(worlds, result.summary["best"], strict=True)):
+        theta = np.array([recommended[k]])
+        rate = float(assess.margin_rates(world, result.experiment, theta, MARGIN_ROLLOUTS, threads)[0])
+        shares.append(rate / max(best["largest_margin_rate"], _LEAST))
+    return shares
 
 
 def _bank(done: int, n: int) -> None:
@@ -156,6 +175,13 @@ def _report(chosen: experiment.Experiment, drones: list[dict[str, Any]]) -> None
         low, high = (float(x) for x in wilson(solved / n, n))
         share = f"solved {solved / n:.2f} ({low:.2f} to {high:.2f}), share of the best {shares.mean():.3f}"
         print(f"after {after:2d} flights: {share}")
+    for after in drones[0]["margin_shares"]:
+        margins = np.array([drone["margin_shares"][after] for drone in drones])
+        enough = float((margins >= _MARGIN_ENOUGH).mean())
+        print(
+            f"after {after:2d} flights: margin rate {margins.mean():.3f} of the largest, {enough:.2f} of the drones "
+            f"at {_MARGIN_ENOUGH:g} of it or above"
+        )
     first = ", ".join(f"flight {k + 1} lands {landed[:, k].mean():.2f}" for k in range(min(2, landed.shape[1])))
     print(first)
     more = f"beyond those of the best policy {beyond.mean():.2f}"

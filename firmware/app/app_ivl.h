@@ -106,6 +106,7 @@ typedef struct
     app_seen_t    seen;             ///< by a camera, of the latest sampling instant; zero without one
     atomic_bool   motors_bypassed;  ///< written by the app's task
     bool          configured;       ///< a configuration was put in force since the start
+    bool          starts_on_path;   ///< a simulated landing: an approach puts the vehicle on its path, whatever it did before
 
     // who drives the motors
     app_owner_t    owner;

@@ -40,6 +40,12 @@ void app_begin_anew(void)
     forget_senses(app);
 }
 
+void app_start_on_path(bool yes)
+{
+    ivl_app.starts_on_path = yes;
+    ivl_app.state.policy.at_once = yes && ivl_app.state.policy.at_once;
+}
+
 void app_release(float mean_norm)
 {
     app_t *const app = &ivl_app;

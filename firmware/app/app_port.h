@@ -13,6 +13,10 @@ void app_boot(const ivl_cfg_t *cfg);
 /// owner of the motors stay.
 void app_begin_anew(void);
 
+/// Whether an approach puts the vehicle on its path, as only a simulated one can be put: then it may be asked for without READY before it.
+/// A policy that flips at once belongs to such a landing: it does so no longer when the vehicle flies by itself.
+void app_start_on_path(bool yes);
+
 /// The stock controller has the motors, and nobody has asked for anything else.
 /// @param[in] mean_norm  mean thrust with which it flies, as a share of the largest
 void app_release(float mean_norm);

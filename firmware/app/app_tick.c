@@ -97,10 +97,20 @@ void app_look_around(app_t *app, bool stock_idle, float setpoint_age_s, uint64_t
     };
 }
 
+// One packet is not to lead from IDLE into a flip: an approach begins from READY, where a request to hover has brought the vehicle before.
+static ivl_request_t request_to_obey(const app_t *app)
+{
+    const bool skips_ready = (app->state.phase == IVL_PHASE_IDLE) && (app->in.cmd.request == IVL_REQUEST_APPROACH);
+    return (skips_ready && !app->starts_on_path) ? IVL_REQUEST_IDLE : app->in.cmd.request;
+}
+
 void app_step(app_t *app)
 {
+    const ivl_request_t asked = app->in.cmd.request;
     app_reading_show(app);
+    app->in.cmd.request = request_to_obey(app);
     ivl_step(&app->cfg, &app->state, &app->in, &app->out);
+    app->in.cmd.request = asked;
     ivl_record_step(&app->recorder, &app->cfg, &app->state, &app->out);
     app_tumble_check_set(app->state.phase);
 }

@@ -45,4 +45,12 @@ ivl_status_t ivl_policy_commit(const ivl_cfg_t *cfg, ivl_state_t *state, const i
 
 /// One tick: sensed state -> distance -> cues -> phase (with the trigger) -> maneuver or controller -> mixer -> PWM.
 void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out);
+
+#ifdef IVL_SIDE_BY_SIDE
+/// For a simulator of many vehicles: ivl_step up to the thrusts of the tracking controller, which it computes for all of them at once, and
+/// without what follows from the thrusts (pwm, pitch_moment_Nm, thrust_total_N: all 0).
+/// @param[out] ref  what the controller is to follow, if the result is true
+/// @return false: out->thrust_N is complete
+bool ivl_step_decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_reference_t *ref);
+#endif
 #endif  // IVL_H

@@ -22,30 +22,31 @@ static ivl_vec3_t feedback(const ivl_cfg_t *cfg, ivl_vec3_t e, ivl_vec3_t e_rate
 // no more lift than four motors have, then no more tilt than allowed: height goes before horizontal position
 static ivl_vec3_t limited(const ivl_cfg_t *cfg, ivl_vec3_t force_W_N, float tan_tilt_max)
 {
-    const float weight_N = cfg->mass_kg * cfg->gravity_mps2;
-    const float lift_N = ivl_clamp(force_W_N.z, IVL_LIFT_NORM_MIN * weight_N, 4.0f * cfg->motor_thrust_N_max);
-    const float side_N_max = tan_tilt_max * lift_N;
-    const float side_N = sqrtf(force_W_N.x * force_W_N.x + force_W_N.y * force_W_N.y);
-    const float keep = (side_N > side_N_max) ? side_N_max / side_N : 1.0f;
+    const float     weight_N = cfg->mass_kg * cfg->gravity_mps2;
+    const ivl_num_t lift_N = ivl_clamp(force_W_N.z, ivl_num(IVL_LIFT_NORM_MIN * weight_N), ivl_num(4.0f * cfg->motor_thrust_N_max));
+    const ivl_num_t side_N_max = tan_tilt_max * lift_N;
+    const ivl_num_t side_N = ivl_root(force_W_N.x * force_W_N.x + force_W_N.y * force_W_N.y);
+    const ivl_num_t keep = ivl_pick(side_N > side_N_max, side_N_max / side_N, ivl_num(1.0f));
     return ivl_vec3(force_W_N.x * keep, force_W_N.y * keep, lift_N);
 }
 
 // heading 0: b2 has no x component, because it is perpendicular to e1
 static ivl_axes_t desired_axes(ivl_vec3_t force_W_N)
 {
-    const ivl_vec3_t b3 = ivl_scale(force_W_N, 1.0f / sqrtf(ivl_dot(force_W_N, force_W_N)));
-    const float      norm = 1.0f / sqrtf(b3.z * b3.z + b3.y * b3.y);
-    const ivl_vec3_t b2 = {0.0f, b3.z * norm, -b3.y * norm};
+    const ivl_vec3_t b3 = ivl_scale(force_W_N, 1.0f / ivl_root(ivl_dot(force_W_N, force_W_N)));
+    const ivl_num_t  norm = 1.0f / ivl_root(b3.z * b3.z + b3.y * b3.y);
+    const ivl_vec3_t b2 = {ivl_num(0.0f), b3.z * norm, -b3.y * norm};
     return (ivl_axes_t){.x = ivl_cross(b2, b3), .y = b2, .z = b3};
 }
 
 // b3' = w_y b1 - w_x b2 is the part of F' / |F| across b3; w_z keeps b2 perpendicular to e1: (w_x b3 - w_z b1) . e1 = 0
 static ivl_vec3_t desired_rate(const ivl_axes_t *d, ivl_vec3_t force_W_N, ivl_vec3_t force_rate_W_Nps)
 {
-    const float per_N = 1.0f / ivl_dot(force_W_N, d->z);
-    const float w_x = ivl_clamp(-ivl_dot(d->y, force_rate_W_Nps) * per_N, -RATE_RADPS_MAX, RATE_RADPS_MAX);
-    const float w_y = ivl_clamp(ivl_dot(d->x, force_rate_W_Nps) * per_N, -RATE_RADPS_MAX, RATE_RADPS_MAX);
-    const float w_z = w_x * d->z.x / d->x.x;
+    const ivl_num_t per_N = 1.0f / ivl_dot(force_W_N, d->z);
+    const ivl_num_t most = ivl_num(RATE_RADPS_MAX);
+    const ivl_num_t w_x = ivl_clamp(-ivl_dot(d->y, force_rate_W_Nps) * per_N, -most, most);
+    const ivl_num_t w_y = ivl_clamp(ivl_dot(d->x, force_rate_W_Nps) * per_N, -most, most);
+    const ivl_num_t w_z = w_x * d->z.x / d->x.x;
     return ivl_add(ivl_scale(d->x, w_x), ivl_add(ivl_scale(d->y, w_y), ivl_scale(d->z, w_z)));
 }
 
@@ -71,19 +72,19 @@ ivl_wrench_t ivl_controller_compute(const ivl_cfg_t *cfg, const ivl_sample_t *sa
     const ivl_vec3_t e_p = ivl_sub(sample->p_WB_m, ref->p_W_m);
     const ivl_vec3_t e_v = ivl_sub(sample->v_WB_mps, ref->v_W_mps);
     const ivl_vec3_t carry = {ref->a_W_mps2.x, ref->a_W_mps2.y, ref->a_W_mps2.z + cfg->gravity_mps2};
-    const ivl_vec3_t asked_N = ivl_add(ivl_scale(carry, cfg->mass_kg), feedback(cfg, e_p, e_v));
+    const ivl_vec3_t asked_N = ivl_add(ivl_scale(carry, ivl_num(cfg->mass_kg)), feedback(cfg, e_p, e_v));
     const ivl_vec3_t force_W_N = limited(cfg, asked_N, tan_tilt_max);
 
     // attitude; e_a + carry is what the rotors make per mass
     const ivl_axes_t r = ivl_axes_of(sample->q_WB);
     const ivl_axes_t d = desired_axes(force_W_N);
-    const float      along_N = ivl_dot(force_W_N, r.z);
+    const ivl_num_t  along_N = ivl_dot(force_W_N, r.z);
     const ivl_vec3_t e_a = ivl_sub(ivl_scale(r.z, along_N / cfg->mass_kg), carry);
     const ivl_vec3_t w_d = desired_rate(&d, force_W_N, feedback(cfg, e_v, e_a));
     const ivl_vec3_t w = sample->w_B_radps;
     const ivl_vec3_t e_w = {w.x - ivl_dot(r.x, w_d), w.y - ivl_dot(r.y, w_d), w.z - ivl_dot(r.z, w_d)};
     return (ivl_wrench_t){
-        .thrust_N = (along_N > 0.0f) ? along_N : 0.0f,
+        .thrust_N = ivl_pick(along_N > 0.0f, along_N, ivl_num(0.0f)),
         .moment_B_Nm = moment(cfg, w, attitude_error(&d, &r), e_w),
     };
 }

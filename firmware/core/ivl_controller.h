@@ -12,7 +12,7 @@ static const float IVL_LIFT_NORM_MIN = 0.2f;
 /// Total thrust along b_z and moment in B.
 typedef struct
 {
-    float      thrust_N;  ///< >= 0
+    ivl_num_t  thrust_N;  ///< >= 0
     ivl_vec3_t moment_B_Nm;
 } ivl_wrench_t;
 

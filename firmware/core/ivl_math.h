@@ -28,12 +28,12 @@ static inline bool ivl_within(float x, float limit)
 }
 
 /// x limited to [lo, hi]; NaN gives lo, so that a bad value becomes the safe end.
-static inline float ivl_clamp(float x, float lo, float hi)
+static inline ivl_num_t ivl_clamp(ivl_num_t x, ivl_num_t lo, ivl_num_t hi)
 {
-    return (x > lo) ? ((x < hi) ? x : hi) : lo;
+    return ivl_pick(x > lo, ivl_pick(x < hi, x, hi), lo);
 }
 
-static inline ivl_vec3_t ivl_vec3(float x, float y, float z)
+static inline ivl_vec3_t ivl_vec3(ivl_num_t x, ivl_num_t y, ivl_num_t z)
 {
     return (ivl_vec3_t){x, y, z};
 }
@@ -48,12 +48,12 @@ static inline ivl_vec3_t ivl_sub(ivl_vec3_t a, ivl_vec3_t b)
     return ivl_vec3(a.x - b.x, a.y - b.y, a.z - b.z);
 }
 
-static inline ivl_vec3_t ivl_scale(ivl_vec3_t a, float s)
+static inline ivl_vec3_t ivl_scale(ivl_vec3_t a, ivl_num_t s)
 {
     return ivl_vec3(a.x * s, a.y * s, a.z * s);
 }
 
-static inline float ivl_dot(ivl_vec3_t a, ivl_vec3_t b)
+static inline ivl_num_t ivl_dot(ivl_vec3_t a, ivl_vec3_t b)
 {
     return a.x * b.x + a.y * b.y + a.z * b.z;
 }
@@ -67,9 +67,9 @@ static inline ivl_vec3_t ivl_cross(ivl_vec3_t a, ivl_vec3_t b)
 static inline ivl_axes_t ivl_axes_of(ivl_quat_t q_WB)
 {
     // doubled products: each appears in several elements
-    const float xx = 2.0f * q_WB.x * q_WB.x, yy = 2.0f * q_WB.y * q_WB.y, zz = 2.0f * q_WB.z * q_WB.z;
-    const float xy = 2.0f * q_WB.x * q_WB.y, xz = 2.0f * q_WB.x * q_WB.z, yz = 2.0f * q_WB.y * q_WB.z;
-    const float wx = 2.0f * q_WB.w * q_WB.x, wy = 2.0f * q_WB.w * q_WB.y, wz = 2.0f * q_WB.w * q_WB.z;
+    const ivl_num_t xx = 2.0f * q_WB.x * q_WB.x, yy = 2.0f * q_WB.y * q_WB.y, zz = 2.0f * q_WB.z * q_WB.z;
+    const ivl_num_t xy = 2.0f * q_WB.x * q_WB.y, xz = 2.0f * q_WB.x * q_WB.z, yz = 2.0f * q_WB.y * q_WB.z;
+    const ivl_num_t wx = 2.0f * q_WB.w * q_WB.x, wy = 2.0f * q_WB.w * q_WB.y, wz = 2.0f * q_WB.w * q_WB.z;
     return (ivl_axes_t){
         .x = {1.0f - (yy + zz), xy + wz, xz - wy},
         .y = {xy - wz, 1.0f - (xx + zz), yz + wx},

@@ -11,51 +11,52 @@ static const float PITCH_SIGN[4] = {-1.0f, 1.0f, 1.0f, -1.0f};
 static const float YAW_SIGN[4] = {-1.0f, 1.0f, -1.0f, 1.0f};
 
 // largest yaw share, up to |yaw|, that keeps every motor within [0, max]
-static float yaw_that_fits(const float base_N[4], float yaw_N, float max_N)
+static ivl_num_t yaw_that_fits(const ivl_num_t base_N[4], ivl_num_t yaw_N, float max_N)
 {
-    float fits_N = fabsf(yaw_N);
+    ivl_num_t fits_N = ivl_magnitude(yaw_N);
     for (int i = 0; i < 4; i++)
     {
-        const float room_N = (YAW_SIGN[i] * yaw_N > 0.0f) ? max_N - base_N[i] : base_N[i];
-        fits_N = (room_N < fits_N) ? room_N : fits_N;
+        const ivl_num_t room_N = ivl_pick(YAW_SIGN[i] * yaw_N > 0.0f, max_N - base_N[i], base_N[i]);
+        fits_N = ivl_pick(room_N < fits_N, room_N, fits_N);
     }
-    return (yaw_N < 0.0f) ? -fits_N : fits_N;
+    return ivl_pick(yaw_N < 0.0f, -fits_N, fits_N);
 }
 
-void ivl_mixer_thrusts(const ivl_cfg_t *cfg, const ivl_wrench_t *wrench, float thrust_N[4])
+void ivl_mixer_thrusts(const ivl_cfg_t *cfg, const ivl_wrench_t *wrench, ivl_num_t thrust_N[4])
 {
     // shares of one motor
-    const float max_N = cfg->motor_thrust_N_max;
-    const float roll_N = 0.25f * wrench->moment_B_Nm.x / cfg->arm_y_m;
-    const float pitch_N = 0.25f * wrench->moment_B_Nm.y / cfg->arm_x_m;
-    const float yaw_N = 0.25f * wrench->moment_B_Nm.z / cfg->torque_per_thrust_m;
-    const float spread_N = fabsf(roll_N) + fabsf(pitch_N);
+    const float     max_N = cfg->motor_thrust_N_max;
+    const ivl_num_t none_N = ivl_num(0.0f), all_N = ivl_num(max_N);
+    const ivl_num_t roll_N = 0.25f * wrench->moment_B_Nm.x / cfg->arm_y_m;
+    const ivl_num_t pitch_N = 0.25f * wrench->moment_B_Nm.y / cfg->arm_x_m;
+    const ivl_num_t yaw_N = 0.25f * wrench->moment_B_Nm.z / cfg->torque_per_thrust_m;
+    const ivl_num_t spread_N = ivl_magnitude(roll_N) + ivl_magnitude(pitch_N);
 
     // collective: gives way at the upper end only, and not below the middle, where the room for roll and pitch is largest
-    const float asked_N = ivl_clamp(0.25f * wrench->thrust_N, 0.0f, max_N);
-    const float yielding_N = ivl_clamp(max_N - spread_N, 0.5f * max_N, max_N);
-    const float each_N = (asked_N < yielding_N) ? asked_N : yielding_N;
+    const ivl_num_t asked_N = ivl_clamp(0.25f * wrench->thrust_N, none_N, all_N);
+    const ivl_num_t yielding_N = ivl_clamp(max_N - spread_N, ivl_num(0.5f * max_N), all_N);
+    const ivl_num_t each_N = ivl_pick(asked_N < yielding_N, asked_N, yielding_N);
 
     // roll and pitch: scaled together into the room that is left
-    const float room_N = (each_N < max_N - each_N) ? each_N : max_N - each_N;
-    const float keep = (spread_N > room_N) ? room_N / spread_N : 1.0f;
+    const ivl_num_t room_N = ivl_pick(each_N < max_N - each_N, each_N, max_N - each_N);
+    const ivl_num_t keep = ivl_pick(spread_N > room_N, room_N / spread_N, ivl_num(1.0f));
 
-    float base_N[4];
+    ivl_num_t base_N[4];
     for (int i = 0; i < 4; i++)
     {
         base_N[i] = each_N + keep * (ROLL_SIGN[i] * roll_N + PITCH_SIGN[i] * pitch_N);
     }
     // yaw: what still fits; the limits only catch rounding and values that are no numbers
-    const float yaw_fit_N = yaw_that_fits(base_N, yaw_N, max_N);
+    const ivl_num_t yaw_fit_N = yaw_that_fits(base_N, yaw_N, max_N);
     for (int i = 0; i < 4; i++)
     {
-        thrust_N[i] = ivl_clamp(base_N[i] + YAW_SIGN[i] * yaw_fit_N, 0.0f, max_N);
+        thrust_N[i] = ivl_clamp(base_N[i] + YAW_SIGN[i] * yaw_fit_N, none_N, all_N);
     }
 }
 
-ivl_wrench_t ivl_mixer_wrench(const ivl_cfg_t *cfg, const float thrust_N[4])
+ivl_wrench_t ivl_mixer_wrench(const ivl_cfg_t *cfg, const ivl_num_t thrust_N[4])
 {
-    const float f1 = thrust_N[0], f2 = thrust_N[1], f3 = thrust_N[2], f4 = thrust_N[3];
+    const ivl_num_t f1 = thrust_N[0], f2 = thrust_N[1], f3 = thrust_N[2], f4 = thrust_N[3];
     return (ivl_wrench_t){
         .thrust_N = f1 + f2 + f3 + f4,
         .moment_B_Nm = {cfg->arm_y_m * (f3 + f4 - f1 - f2), cfg->arm_x_m * (f2 + f3 - f1 - f4),

@@ -151,19 +151,24 @@ static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in,
     ivl_phase_update(cfg, state, seen);
 }
 
-void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
+// all of a tick but the thrusts
+static ivl_drive_t begin(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_seen_t *seen)
 {
     state->diag.n_tick++;
-    ivl_seen_t seen = {.cues = {.valid = false}};
     // a finished landing only waits for the end of its request cycle
     if ((state->phase != IVL_PHASE_DONE) || (in->cmd.request == IVL_REQUEST_IDLE))
     {
-        decide(cfg, state, in, &seen);
+        decide(cfg, state, in, seen);
     }
+    rest(state, seen, out);
+    return ivl_phase_drive(state);
+}
 
+void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out)
+{
+    ivl_seen_t        seen = {.cues = {.valid = false}};
+    const ivl_drive_t what = begin(cfg, state, in, out, &seen);
     // phase -> thrusts -> PWM
-    rest(state, &seen, out);
-    const ivl_drive_t what = ivl_phase_drive(state);
     if (what != IVL_DRIVE_OFF)
     {
         out->motors_on = true;
@@ -174,3 +179,22 @@ void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_
         out->thrust_total_N = made.thrust_N;
     }
 }
+
+#ifdef IVL_SIDE_BY_SIDE
+bool ivl_step_decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_reference_t *ref)
+{
+    ivl_seen_t        seen = {.cues = {.valid = false}};
+    const ivl_drive_t what = begin(cfg, state, in, out, &seen);
+    const bool        follows = (what != IVL_DRIVE_OFF) && (what != IVL_DRIVE_FLIP);
+    out->motors_on = what != IVL_DRIVE_OFF;
+    if (follows)
+    {
+        *ref = reference(cfg, state, what, &seen);
+    }
+    else if (out->motors_on)
+    {
+        ivl_maneuver_thrusts(cfg, state->snapshot.action.moment_Nm, out->thrust_N);
+    }
+    return follows;
+}
+#endif

@@ -7,14 +7,16 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "ivl_num.h"
+
 typedef struct
 {
-    float x, y, z;
+    ivl_num_t x, y, z;
 } ivl_vec3_t;
 
 typedef struct
 {
-    float x, y, z, w;  ///< w is the scalar part
+    ivl_num_t x, y, z, w;  ///< w is the scalar part
 } ivl_quat_t;
 
 /// Result of an operation that can be refused.  Zero is success, negative values are refusals.

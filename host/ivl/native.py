@@ -20,8 +20,9 @@ import numpy.typing as npt
 
 from ivl.errors import NativeError
 
-ABI_VERSION = 2
+ABI_VERSION = 3
 LIBRARY_ENV = "IVL_NATIVE_LIBRARY"  # another build of the library, for example one with sanitizers
+REGISTER_BITS_ENV = "IVL_REGISTER_BITS"  # width of the registers in which rollouts stand side by side
 DEFAULT_LIBRARY = Path(__file__).parent / "_native" / "libivl_sil.so"
 
 TABLE_PARAM, TABLE_SPEC, TABLE_OUTCOME, TABLE_TRACE, TABLE_DERIVED = range(5)
@@ -96,6 +97,8 @@ class NativeLibrary:
                 f"{path}: interface version {version}, this package needs {ABI_VERSION}: run `make build`"
             )
         self.path = path
+        if asked := os.environ.get(REGISTER_BITS_ENV):
+            self.use_registers(asked)
         self.params: Mapping[str, Field] = {f.name: f for f in self._fields(TABLE_PARAM)[0]}
         self.spec_fields, self.spec_dtype = self._table(TABLE_SPEC)
         self.outcome_fields, self.outcome_dtype = self._table(TABLE_OUTCOME)
@@ -120,6 +123,29 @@ class NativeLibrary:
         """Fields of a packet of the app channel, by its type, or of a record of the vehicle (`LAYOUT_...`)."""
         fields, item_size = self._fields(code, "ivl_sil_layout")
         return {f.name: f for f in fields}, _dtype(fields if item_size else (), item_size)
+
+    def use_registers(self, bits: int | str = 0) -> int:
+        """Choose the width of the registers in which rollouts stand side by side; outcomes do not depend on it.
+
+        Args:
+            bits: 128, 256 or 512; 0: the widest that this machine has.
+
+        Returns:
+            The width in use from now on, in every thread.
+
+        Raises:
+            NativeError: This machine has no such registers; nothing is changed.
+        """
+        width = int(self._c.ivl_sil_register_bits(int(bits))) if str(bits).isdecimal() else 0
+        if width == 0:
+            raise NativeError(
+                f"no registers of {bits} bits here (128, 256 or 512, if the machine has them; 0: the widest)"
+            )
+        return width
+
+    def register_bits(self) -> int:
+        """Width of the registers in use."""
+        return int(self._c.ivl_sil_register_bits(-1))
 
     def wire_version(self) -> int:
         """Version that the second byte of each packet of the app channel has."""
@@ -297,13 +323,18 @@ class NativeModel:
 
     def rollouts(self, specs: npt.NDArray[np.void], n_threads: int) -> npt.NDArray[np.void]:
         """Fly `specs` (1-D, `spec_dtype`); returns the outcomes in the same order, same bits for any `n_threads`."""
+        return self.rollouts_and_occupancy(specs, n_threads)[0]
+
+    def rollouts_and_occupancy(self, specs: npt.NDArray[np.void], n_threads: int) -> tuple[npt.NDArray[np.void], float]:
+        """The same, and the share of the lanes' evaluations that the landings asked for."""
+        work = np.zeros(2, dtype=np.uint64)
         outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
         status = self._library._c.ivl_sil_rollouts(
-            self._handle, _pointer(specs), specs.size, n_threads, _pointer(outcomes)
+            self._handle, _pointer(specs), specs.size, n_threads, _pointer(outcomes), _pointer(work)
         )
         if status != 0:
             raise NativeError(f"the native batch of {specs.size} rollouts failed with status {status}")
-        return outcomes
+        return outcomes, float(work[1]) / float(work[0]) if work[0] else 1.0
 
     def trace(self, spec: npt.NDArray[np.void], period_s: float) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """Fly one spec and record it every `period_s`; returns (rows, outcome of shape (1,))."""
@@ -373,12 +404,13 @@ def _declare(c: Any) -> None:
     for name, restype, argtypes in (
         ("ivl_sil_table", ctypes.POINTER(_CField), (c_int, u32p, u32p)),
         ("ivl_sil_abi_version", c_int, ()),
+        ("ivl_sil_register_bits", c_int, (c_int,)),
         ("ivl_sil_model_create", ptr, (ptr, ctypes.c_char_p, size)),
         ("ivl_sil_model_free", None, (ptr,)),
         ("ivl_sil_model_derived", None, (ptr, ptr)),
         ("ivl_sil_model_surface", None, (ptr, ptr)),
         ("ivl_sil_surface_forward", None, (ptr, ptr)),
-        ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr)),
+        ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_replay", c_int, (ptr, ptr, c_int, ptr, ptr, size, ptr)),
         ("ivl_sil_form", ctypes.c_uint32, (c_int, textp, textp)),

@@ -210,7 +210,7 @@ static void draw_power(ivl_cf_t *cf)
     const float thrust_N = cf->motor_N[0] + cf->motor_N[1] + cf->motor_N[2] + cf->motor_N[3];
     if (cf->set.sim.cell_V > 0.0f && cf->model.raw.battery_voltage_V > 0.0)  // motors of a supply that never sags do not weaken
     {
-        ivl_cf_world(cf)->rotor.open_circuit_V = (double)cf->set.sim.cell_V;
+        cf->group.rotor.open_circuit_V[IVL_CF_LANE] = (double)cf->set.sim.cell_V;
     }
     ivl_cf_power_step(&cf->power, thrust_N / weight_N, told_V(cf, thrust_N), cf->set.low_V, IVL_CF_PLANNER_MS);
 }

@@ -54,12 +54,20 @@ static void start(ivl_cf_t *cf, double z_m)
     ivl_sim_world_start(&cf->group, IVL_CF_LANE, &rng, p, v);
 }
 
+static void stop_rotors(ivl_cf_t *cf)
+{
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        cf->group.rotor.speed_radps[i][IVL_CF_LANE] = 0.0;
+    }
+}
+
 void ivl_cf_world_boot(ivl_cf_t *cf)
 {
     const double level[4] = {0.0, 0.0, 0.0, 1.0};
     start(cf, FLOOR_Z_M);
     place_on_floor(cf, (double)cf->set.sim.start_x_m, (double)cf->set.sim.start_y_m, level);
-    memset(ivl_cf_world(cf)->rotor.speed_radps, 0, sizeof ivl_cf_world(cf)->rotor.speed_radps);
+    stop_rotors(cf);
 }
 
 void ivl_cf_world_reset(ivl_cf_t *cf)
@@ -101,7 +109,7 @@ void ivl_cf_world_place(ivl_cf_t *cf, bool at_start)
     start(cf, FLOOR_Z_M);
     place_on_floor(cf, at_start ? (double)cf->set.sim.start_x_m : kin.p_WB_m[0], at_start ? (double)cf->set.sim.start_y_m : kin.p_WB_m[1],
                    level);
-    memset(ivl_cf_world(cf)->rotor.speed_radps, 0, sizeof ivl_cf_world(cf)->rotor.speed_radps);
+    stop_rotors(cf);
     (void)ivl_cf_supervisor_arm(&cf->supervisor, false);
     ivl_cf_planner_stop(&cf->planner);
     ivl_cf_commander_relax(&cf->commander);
@@ -126,15 +134,17 @@ static void come_to_rest(ivl_cf_t *cf)
 
 static void rest(ivl_cf_t *cf)
 {
-    ivl_sim_world_t    *w = ivl_cf_world(cf);
-    const ivl_sim_kin_t kin = ivl_sim_world_kin(&cf->group, IVL_CF_LANE);
-    const ivl_rot_t     R = ivl_rot_from_quat(kin.q_WB);
-    ivl_sim_airflow_t   body = {.gap_m = ivl_sim_world_gap_m(&cf->group, IVL_CF_LANE)};  // at rest
-    memcpy(body.q_WB, kin.q_WB, sizeof body.q_WB);
-    const ivl_sim_thrust_t load = ivl_sim_rotor_step(&cf->model, &w->rotor, &body, cf->model.tick_s);
-    w->left_s = 0.0;
-    w->restart = true;
-    cf->grounded = !(load.thrust_N * R.row[2].z > cf->model.mass_total_kg * cf->model.raw.world_gravity_mps2);
+    ivl_sim_group_t        *group = &cf->group;
+    const ivl_sim_kin_t     kin = ivl_sim_world_kin(group, IVL_CF_LANE);
+    const ivl_rot_t         R = ivl_rot_from_quat(kin.q_WB);
+    const ivl_w3_t          still = ivl_w3_of(ivl_d3(0.0, 0.0, 0.0));
+    const ivl_wide_t        tick_s = ivl_wide(cf->model.tick_s);
+    const ivl_sim_airflow_t flow = {ivl_wide(ivl_sim_world_gap_m(group, IVL_CF_LANE)), &still, group->state.q_WB};
+    ivl_sim_load_t          load;
+    ivl_sim_rotor_step(&cf->model, &group->rotor, &flow, &tick_s, &group->rotor, &load);
+    group->progress.left_s[IVL_CF_LANE] = 0.0;
+    group->progress.restart[IVL_CF_LANE] = -1;
+    cf->grounded = !(load.thrust_N[IVL_CF_LANE] * R.row[2].z > cf->model.mass_total_kg * cf->model.raw.world_gravity_mps2);
 }
 
 /// The motion that has been due since the last tick.  The world bounds the steps that this takes.
@@ -179,6 +189,7 @@ void ivl_cf_world_tick(ivl_cf_t *cf)
         ivl_cf_neighbours_tell(cf);
         ivl_cf_neighbours_bump(cf);
     }
+    app_start_on_path(cf->set.sim.start != IVL_CF_START_AS_FLOWN);
     const ivl_phase_t before = app_core_state()->phase;
     ivl_sim_world_tick(&cf->group, IVL_CF_LANE);
     const ivl_phase_t after = app_core_state()->phase;

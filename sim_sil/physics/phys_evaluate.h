@@ -73,8 +73,8 @@ IVL_SIM_INLINE void phys_accelerate(const ivl_sim_model_t *model, const ivl_sim_
         rows[i] = phys_constraint_row(model, contact, &k, i);
         const ivl_wide_t speed2 = ivl_w3_dot(k.v_rod[i], k.v_rod[i]);
         const ivl_wide_t excess = ivl_w3_dot(k.rod[i], k.rod[i]) - length * length;
-        fastest2 = phys_larger(fastest2, speed2);
-        longest = phys_larger(longest, ivl_wide_abs(excess));
+        fastest2 = ivl_wide_larger(speed2, fastest2);
+        longest = ivl_wide_larger(ivl_wide_abs(excess), longest);
         const ivl_wide_t curvature =
             speed2 * (1.0 / length) + 2.0 * sigma * ivl_w3_dot(k.n[i], k.v_rod[i]) + (0.5 * sigma * sigma / length) * excess;
         r[i] = curvature + inv_mass * ivl_w3_dot(k.n[i], phys_along_surface(sliding, k.normal, f_foot[i])) -

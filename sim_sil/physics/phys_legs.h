@@ -81,11 +81,6 @@ IVL_SIM_INLINE phys_hinge_t phys_hinge(const ivl_sim_leg_model_t *leg, int i, iv
     return h;
 }
 
-IVL_SIM_INLINE ivl_wide_t phys_larger(ivl_wide_t a, ivl_wide_t b)
-{
-    return ivl_wide_select(b > a, b, a);
-}
-
 /// How much faster than at rest the fastest leg swings.  One that is bent sideways has less inertia about its first hinge; one
 /// whose foot is stuck has the body's.                                                             [MODEL eq. 7.8]
 IVL_SIM_INLINE ivl_wide_t phys_fastest_swing(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact,
@@ -97,7 +92,7 @@ IVL_SIM_INLINE ivl_wide_t phys_fastest_swing(const ivl_sim_model_t *model, const
     {
         const ivl_wide_t share = ivl_wide_select(contact->inverse_mass[i] > 0.0, ivl_wide(1.0), ivl_wide(model->step.stuck_norm));
         const ivl_wide_t swing = share * h[i].inv_cos_beta * h[i].inv_cos_beta;
-        fastest = phys_larger(fastest, swing);
+        fastest = ivl_wide_larger(swing, fastest);
     }
     return fastest;
 }

@@ -140,18 +140,24 @@ IVL_SIM_INLINE void ivl_sim_sincos(double x, double *sine, double *cosine)
 }
 
 /// exp(x) for x <= 0; 0 below -700.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_exp(ivl_wide_t x)
+{
+    const ivl_wide_t n = ivl_wide_floor(x * 1.44269504088896340736 + 0.5);
+    const ivl_wide_t r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
+    // 2^n: the last digits of a number beyond 2^52 are whole, here the exponent of the power
+    const ivl_wide_t power = (ivl_wide_t)((ivl_mask_t)(n + (4503599627370496.0 + 1023.0)) << 52);
+    ivl_wide_t       p = ivl_wide(IVL_SIM_EXP[11]);
+    IVL_SIM_UNROLL
+    for (int k = 10; k >= 0; k--)
+    {
+        p = p * r + IVL_SIM_EXP[k];
+    }
+    return ivl_wide_select(x > -700.0, power * p, ivl_wide(0.0));
+}
+
 IVL_SIM_INLINE double ivl_sim_exp(double x)
 {
-    if (!(x > -700.0))
-    {
-        return 0.0;
-    }
-    const double   n = floor(x * 1.44269504088896340736 + 0.5);
-    const double   r = (x - n * 6.93147180369123816490e-01) - n * 1.90821492927058770002e-10;
-    const uint64_t bits = (uint64_t)((int64_t)n + 1023) << 52;
-    double         power;
-    memcpy(&power, &bits, sizeof power);
-    return power * ivl_sim_polynomial(IVL_SIM_EXP, 12, r);
+    return ivl_wide_exp(ivl_wide(x))[0];
 }
 
 /// Natural logarithm of a positive, normal x.

@@ -21,11 +21,10 @@ IVL_SIM_INLINE void normalize(ivl_wide_t q[4])
     }
 }
 
-IVL_SIM_INLINE void leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load,
-                             const ivl_wide_t *dt_s, const ivl_sim_state_t *s, const ivl_sim_rate_t *last, ivl_sim_state_t *next,
-                             ivl_sim_rate_t *rate)
+void ivl_sim_leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load, const ivl_wide_t *dt_s,
+                      const ivl_sim_state_t *s, const ivl_sim_rate_t *last, ivl_sim_state_t *next, ivl_sim_rate_t *rate)
 {
-    const ivl_wide_t dt = *dt_s;  // by address: a vector argument may not pass between functions of different targets
+    const ivl_wide_t dt = *dt_s;
     const ivl_wide_t half = 0.5 * dt;
     ivl_sim_state_t  mid;
     mid.p_WB_m = ivl_w3_plus(s->p_WB_m, half, s->v_WB_mps);
@@ -51,47 +50,4 @@ IVL_SIM_INLINE void leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact
         next->v_foot_W_mps[i] = ivl_w3_plus(s->v_foot_W_mps[i], dt, rate->a_foot_W_mps2[i]);
         next->p_foot_W_m[i] = ivl_w3_plus(mid.p_foot_W_m[i], half, next->v_foot_W_mps[i]);
     }
-}
-
-// The same source, for registers of 128, 256 and 512 bits.  All give the same bits: lanes never mix, and without fused
-// multiply-add every width rounds alike.  A build can be held to narrower ones, to show that.
-#if !defined(IVL_SIM_WIDEST_BITS)
-#define IVL_SIM_WIDEST_BITS 512
-#endif
-#if defined(__x86_64__)
-#define STEP_FOR(name, isa)                                                                                                                \
-    __attribute__((target(isa))) static void name(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact,                          \
-                                                  const ivl_sim_load_t *load, const ivl_wide_t *dt_s, const ivl_sim_state_t *state,        \
-                                                  const ivl_sim_rate_t *last, ivl_sim_state_t *next, ivl_sim_rate_t *rate)                 \
-    {                                                                                                                                      \
-        leapfrog(model, contact, load, dt_s, state, last, next, rate);                                                                     \
-    }
-#if IVL_SIM_WIDEST_BITS >= 256
-STEP_FOR(leapfrog_avx2, "avx2")
-#endif
-#if IVL_SIM_WIDEST_BITS >= 512 && defined(__clang__)
-STEP_FOR(leapfrog_avx512, "avx512f,avx512dq")
-#elif IVL_SIM_WIDEST_BITS >= 512
-STEP_FOR(leapfrog_avx512, "avx512f,avx512dq,prefer-vector-width=512")
-#endif
-#endif
-
-void ivl_sim_leapfrog(const ivl_sim_model_t *model, const ivl_sim_contact_t *contact, const ivl_sim_load_t *load, const ivl_wide_t *dt_s,
-                      const ivl_sim_state_t *state, const ivl_sim_rate_t *last, ivl_sim_state_t *next, ivl_sim_rate_t *rate)
-{
-#if defined(__x86_64__) && IVL_SIM_WIDEST_BITS >= 512
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq"))
-    {
-        leapfrog_avx512(model, contact, load, dt_s, state, last, next, rate);
-        return;
-    }
-#endif
-#if defined(__x86_64__) && IVL_SIM_WIDEST_BITS >= 256
-    if (__builtin_cpu_supports("avx2"))
-    {
-        leapfrog_avx2(model, contact, load, dt_s, state, last, next, rate);
-        return;
-    }
-#endif
-    leapfrog(model, contact, load, dt_s, state, last, next, rate);
 }

@@ -7,6 +7,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
 #include "phys_vector.h"
 
 // Vectors are passed by value only between inlined functions, so how the ABI would pass them does not matter.
@@ -19,15 +23,22 @@
 #define IVL_SIM_UNROLL _Pragma("GCC unroll 16")
 #endif
 
-enum
-{
-    IVL_SIM_LANES = 8  ///< rollouts that are stepped together; a power of two
-};
+/// Rollouts that are stepped together, one in each double of a register; a power of two.  Physics and world are compiled once for each width
+/// of registers that a machine may have (tools/native.mk); everything else sees the narrowest, which every machine has.
+#if !defined(IVL_SIM_LANES)
+#define IVL_SIM_LANES 2
+#endif
 
-/// One number of each of several rollouts.  Every operation acts on each lane alone, so a lane's bits do not depend on its
-/// neighbours, and the same source serves registers of any width.
-typedef double  ivl_wide_t __attribute__((vector_size(sizeof(double) * IVL_SIM_LANES)));
-typedef int64_t ivl_mask_t __attribute__((vector_size(sizeof(int64_t) * IVL_SIM_LANES)));  ///< comparison: all bits set, or none
+/// A function of which there is one for each width: sim_width.h chooses among them.
+#define IVL_SIM_OF_WIDTH(name)       IVL_SIM_WITH_LANES(name, IVL_SIM_LANES)
+#define IVL_SIM_WITH_LANES(name, n)  IVL_SIM_WITH_LANES_(name, n)
+#define IVL_SIM_WITH_LANES_(name, n) name##_lanes##n
+
+/// One number of each of several rollouts, in one register.  Every operation acts on each lane alone, and rounds alike in registers of any
+/// width (there is no fused multiply-add), so a lane's bits depend neither on its neighbours nor on the width.
+typedef double     ivl_wide_t __attribute__((vector_size(sizeof(double) * IVL_SIM_LANES)));
+typedef int64_t    ivl_mask_t __attribute__((vector_size(sizeof(int64_t) * IVL_SIM_LANES)));  ///< comparison: all bits set, or none
+typedef ivl_mask_t ivl_whole_t;  ///< whole numbers: a mask is 0 or -1 in each lane
 
 /// The same number in all lanes.
 IVL_SIM_INLINE ivl_wide_t ivl_wide(double a)
@@ -55,14 +66,61 @@ IVL_SIM_INLINE ivl_wide_t ivl_wide_abs(ivl_wide_t a)
     return (ivl_wide_t)((ivl_mask_t)a & 0x7fffffffffffffffLL);
 }
 
+/// The smaller of two numbers; b unless a < b.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_smaller(ivl_wide_t a, ivl_wide_t b)
+{
+    return ivl_wide_select(a < b, a, b);
+}
+
+/// The larger of two numbers; b unless a > b.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_larger(ivl_wide_t a, ivl_wide_t b)
+{
+    return ivl_wide_select(a > b, a, b);
+}
+
+/// Nearest whole number of |a| < 2^51: so large a number is added that no digits are left for the rest.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_nearest(ivl_wide_t a)
+{
+    return (a + 6755399441055744.0) - 6755399441055744.0;
+}
+
+/// Largest whole number that is not above a, |a| < 2^51.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_floor(ivl_wide_t a)
+{
+    const ivl_wide_t near = ivl_wide_nearest(a);
+    return near - ivl_wide_select(near > a, ivl_wide(1.0), ivl_wide(0.0));
+}
+
+/// Smallest whole number that is not below a, |a| < 2^51.
+IVL_SIM_INLINE ivl_wide_t ivl_wide_ceil(ivl_wide_t a)
+{
+    const ivl_wide_t near = ivl_wide_nearest(a);
+    return near + ivl_wide_select(near < a, ivl_wide(1.0), ivl_wide(0.0));
+}
+
+/// The same answer in all lanes.
+IVL_SIM_INLINE ivl_mask_t ivl_mask(bool yes)
+{
+    return (ivl_mask_t){0} - (yes ? 1 : 0);
+}
+
+/// True if the mask is set in any lane.  Compilers make of the loop a long chain, so where there is an instruction for it, it is named.
 IVL_SIM_INLINE bool ivl_mask_any(ivl_mask_t m)
 {
+#if defined(__AVX512DQ__) && IVL_SIM_LANES == 8
+    return _mm512_movepi64_mask((__m512i)m) != 0;
+#elif defined(__AVX__) && IVL_SIM_LANES == 4
+    return _mm256_movemask_pd((__m256d)m) != 0;
+#elif defined(__SSE2__) && IVL_SIM_LANES == 2
+    return _mm_movemask_pd((__m128d)m) != 0;
+#else
     int64_t any = 0;
     for (int i = 0; i < IVL_SIM_LANES; i++)
     {
         any |= m[i];
     }
     return any != 0;
+#endif
 }
 
 /// A vector of each of several rollouts.

@@ -13,43 +13,56 @@ static const double REARM_GAP_M = 1.0e-3;
 static const double NEAR_MARGIN_M = 0.05;  // more than a vehicle moves in one step
 static const double FAR_M = 1.0;           // stands for the gap of what cannot make an event
 
-/// Height of a plate's highest point above the body origin depends on the surface's normal in body axes alone.
-static ivl_d3_t normal_of(const ivl_sim_surface_t *surface, const ivl_sim_state_t *s, int lane)
+ivl_wide_t world_surface_m(const ivl_sim_group_t *group, ivl_wide_t t_s)
 {
-    const double   x = s->q_WB[0][lane], y = s->q_WB[1][lane], z = s->q_WB[2][lane], w = s->q_WB[3][lane];
-    const ivl_d3_t row_z = ivl_d3(2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y));
+    return group->progress.surface_m + t_s * ivl_sim_surface_speed(&group->model->surface);
+}
+
+/// Height of a plate's highest point above the body origin depends on the surface's normal in body axes alone.
+IVL_SIM_INLINE ivl_w3_t normal_of(const ivl_sim_surface_t *surface, const ivl_sim_state_t *s)
+{
+    const ivl_wide_t x = s->q_WB[0], y = s->q_WB[1], z = s->q_WB[2], w = s->q_WB[3];
+    const ivl_w3_t   row_z = {2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)};
     if (ivl_d3_is_z(surface->normal_W))
     {
         return row_z;
     }
-    const ivl_rot_t R = {.row = {{1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
-                                 {2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)},
-                                 row_z}};
-    return ivl_rot_apply_inverse(&R, surface->normal_W);
+    const ivl_wrot_t R = {.row = {{1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)},
+                                  {2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)},
+                                  row_z}};
+    return ivl_wrot_apply_inverse_d3(&R, surface->normal_W);
 }
 
-static double foot_gap(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double surface_m, int i)
+IVL_SIM_INLINE ivl_wide_t foot_gap(const ivl_sim_model_t *model, const ivl_sim_state_t *s, ivl_wide_t surface_m, int i)
 {
-    return surface_m - ivl_sim_surface_height_of(&w->model->surface, ivl_w3_lane(&s->p_foot_W_m[i], lane)) -
-           w->model->raw.leg_foot_radius_m;
+    return surface_m - ivl_sim_surface_heights_of(&model->surface, s->p_foot_W_m[i]) - model->raw.leg_foot_radius_m;
 }
 
-bool world_gaps(const ivl_sim_world_t *w, const ivl_sim_state_t *s, int lane, double t_s, double gap[IVL_SIM_GAPS])
+ivl_mask_t world_gaps(const ivl_sim_group_t *group, const ivl_sim_state_t *s, ivl_wide_t t_s, ivl_mask_t which,
+                      ivl_wide_t gap[IVL_SIM_GAPS])
 {
-    const ivl_sim_surface_t *surface = &w->model->surface;
-    const double             surface_m = ivl_sim_world_surface_m(w, t_s);
-    const double             room = surface_m - ivl_sim_surface_height_of(surface, ivl_w3_lane(&s->p_WB_m, lane));
-    const bool               near = room < w->model->reach_m + NEAR_MARGIN_M;
-    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    const ivl_sim_model_t   *model = group->model;
+    const ivl_sim_surface_t *surface = &model->surface;
+    const ivl_mask_t        *may_touch = group->touch.may_touch;
+    const ivl_wide_t         surface_m = world_surface_m(group, t_s), far = ivl_wide(FAR_M);
+    const ivl_wide_t         room = surface_m - ivl_sim_surface_heights_of(surface, s->p_WB_m);
+    const ivl_mask_t         near = which & (room < model->reach_m + NEAR_MARGIN_M);
+    for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
-        const bool may_touch = near && (w->foot[i] == IVL_SIM_FOOT_FREE) && !w->detached[i];
-        gap[i] = may_touch ? foot_gap(w, s, lane, surface_m, i) : FAR_M;
+        gap[i] = ivl_wide_select(which, far, gap[i]);
     }
-    const ivl_d3_t normal = near ? normal_of(surface, s, lane) : ivl_d3(0.0, 0.0, 1.0);
-    for (int i = 0; i < IVL_SIM_PLATES; i++)
+    if (ivl_mask_any(near))
     {
-        const bool may_touch = near && !w->plate_touched[i];
-        gap[IVL_SIM_LEGS + i] = may_touch ? room - ivl_sim_plate_top(&w->model->plate[i], normal) : FAR_M;
+        const ivl_w3_t normal = normal_of(surface, s);
+        for (int i = 0; i < IVL_SIM_LEGS; i++)
+        {
+            gap[i] = ivl_wide_select(near & may_touch[i], foot_gap(model, s, surface_m, i), gap[i]);
+        }
+        for (int i = 0; i < IVL_SIM_PLATES; i++)
+        {
+            ivl_wide_t *plate = &gap[IVL_SIM_LEGS + i];
+            *plate = ivl_wide_select(near & may_touch[IVL_SIM_LEGS + i], room - phys_plate_top(&model->plate[i], normal), *plate);
+        }
     }
     return near;
 }
@@ -89,32 +102,41 @@ static double first_zero(double g0, double d0, double g1, double d1, double tole
     return hi;
 }
 
-double world_event_share(ivl_sim_group_t *group, int lane)
+/// Share of the tried step at which a foot touches first, in the lanes in which it may.  A foot rings: the cubic through height and speed finds
+/// a touch within the step.
+static ivl_wide_t foot_share(const ivl_sim_group_t *group, int leg, ivl_mask_t which)
 {
-    ivl_sim_world_t         *w = &group->world[lane];
-    const double            *g0 = w->trial.gap_m, dt = w->trial.dt_s;
-    double                   share = WORLD_NO_EVENT;
-    double                  *g1 = w->trial.gap_after_m;
-    const ivl_sim_surface_t *surface = &w->model->surface;
-    if (!world_gaps(w, &group->next, lane, w->t_s + dt, g1))
+    const ivl_sim_progress_t *progress = &group->progress;
+    const ivl_sim_surface_t  *surface = &group->model->surface;
+    const double              flees_mps = ivl_sim_surface_speed(surface);
+    const ivl_wide_t          g0 = progress->gap_m[leg], g1 = progress->gap_after_m[leg], dt = progress->dt_s;
+    const ivl_wide_t          d0 = -dt * (ivl_sim_surface_heights_of(surface, group->state.v_foot_W_mps[leg]) - flees_mps);
+    const ivl_wide_t          d1 = -dt * (ivl_sim_surface_heights_of(surface, group->next.v_foot_W_mps[leg]) - flees_mps);
+    const ivl_mask_t          may = which & (g1 < FAR_M) & (~(g1 >= -FOOT_TOLERANCE_M) | ((d0 < 0.0) & (d1 > 0.0)));
+    ivl_wide_t                share = ivl_wide(WORLD_NO_EVENT);
+    for (int lane = 0; lane < IVL_SIM_LANES && ivl_mask_any(may); lane++)
     {
-        return WORLD_NO_EVENT;
+        if (may[lane])
+        {
+            share[lane] = first_zero(g0[lane], d0[lane], g1[lane], d1[lane], FOOT_TOLERANCE_M);
+        }
     }
-    for (int i = 0; i < IVL_SIM_GAPS; i++)
+    return share;
+}
+
+ivl_wide_t world_event_share(ivl_sim_group_t *group, ivl_mask_t which)
+{
+    const ivl_sim_progress_t *progress = &group->progress;
+    ivl_wide_t                share = ivl_wide(WORLD_NO_EVENT);
+    for (int i = 0; i < IVL_SIM_LEGS && ivl_mask_any(which); i++)
     {
-        double s = WORLD_NO_EVENT;
-        if (i >= IVL_SIM_LEGS)
-        {
-            s = (g1[i] < -PLATE_TOLERANCE_M) ? g0[i] / (g0[i] - g1[i]) : WORLD_NO_EVENT;
-        }
-        else if (g1[i] < FAR_M)
-        {
-            // a foot rings: cubic through height and speed, so that a touch within the step is not missed
-            const double d0 = -dt * ivl_sim_surface_closing(surface, ivl_w3_lane(&group->state.v_foot_W_mps[i], lane));
-            const double d1 = -dt * ivl_sim_surface_closing(surface, ivl_w3_lane(&group->next.v_foot_W_mps[i], lane));
-            s = first_zero(g0[i], d0, g1[i], d1, FOOT_TOLERANCE_M);
-        }
-        share = (s < share) ? s : share;
+        share = ivl_wide_smaller(foot_share(group, i, which), share);
+    }
+    for (int i = IVL_SIM_LEGS; i < IVL_SIM_GAPS; i++)
+    {
+        const ivl_wide_t g0 = progress->gap_m[i], g1 = progress->gap_after_m[i];
+        const ivl_mask_t touches = which & (g1 < -PLATE_TOLERANCE_M);
+        share = ivl_wide_smaller(ivl_wide_select(touches, g0 / (g0 - g1), ivl_wide(WORLD_NO_EVENT)), share);
     }
     return share;
 }
@@ -123,7 +145,7 @@ static void hold(ivl_sim_group_t *group, int lane, int leg, ivl_sim_foot_t foot)
 {
     ivl_sim_world_t *w = &group->world[lane];
     w->foot[leg] = foot;
-    w->restart = true;
+    group->progress.restart[lane] = -1;
     ivl_sim_contact_set(w->model, &group->contact, lane, w->foot);
     bool listed = foot != IVL_SIM_FOOT_STUCK;
     for (int i = 0; i < w->n_order; i++)
@@ -143,41 +165,30 @@ static void stop_held_feet(ivl_sim_group_t *group, int lane)
     ivl_sim_lane_set(&group->state, lane, &kin);
 }
 
-/// Positive form: a gap that is no number has been passed.
-static bool all_open(const double gap[IVL_SIM_GAPS])
+static double tolerance_m(int gap)
 {
-    bool open = true;
-    for (int i = 0; i < IVL_SIM_GAPS; i++)
-    {
-        open = open & (gap[i] > ((i < IVL_SIM_LEGS) ? FOOT_TOLERANCE_M : PLATE_TOLERANCE_M));
-    }
-    return open;
+    return (gap < IVL_SIM_LEGS) ? FOOT_TOLERANCE_M : PLATE_TOLERANCE_M;
 }
 
-void world_handle_touches(ivl_sim_group_t *group, int lane, const double gap[IVL_SIM_GAPS])
+static void touch(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t *w = &group->world[lane];
-    if (all_open(gap))
-    {
-        return;
-    }
-    bool event = false, foot_event = false;
+    const double     t_s = ivl_sim_world_time_s(group, lane);
+    bool             foot_event = false;
     for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
-        const bool is_foot = i < IVL_SIM_LEGS;
-        if (gap[i] > (is_foot ? FOOT_TOLERANCE_M : PLATE_TOLERANCE_M))
+        if (group->progress.gap_m[i][lane] > tolerance_m(i))
         {
             continue;
         }
         if (!w->impact.happened)
         {
-            w->impact = (ivl_sim_impact_t){true, w->t_s, ivl_sim_world_kin(group, lane)};
+            w->impact = (ivl_sim_impact_t){true, t_s, ivl_sim_world_kin(group, lane)};
         }
-        event = true;
-        if (is_foot)
+        if (i < IVL_SIM_LEGS)
         {
             foot_event = true;
-            w->t_touch_s[i] = w->t_s;
+            group->touch.t_touch_s[i][lane] = t_s;
             hold(group, lane, i, (w->model->raw.leg_stick_delay_s > 0.0) ? IVL_SIM_FOOT_SLIDING : IVL_SIM_FOOT_STUCK);
         }
         else
@@ -189,32 +200,34 @@ void world_handle_touches(ivl_sim_group_t *group, int lane, const double gap[IVL
     {
         stop_held_feet(group, lane);
     }
-    if (event)
-    {
-        world_restart_step(w, &group->state, lane);
-    }
+    ivl_sim_world_note_contact(group, lane);
+    world_restart_step(group, lane);
 }
 
-/// Feet of which none is held, or has just come off.
-static bool all_loose(const ivl_sim_world_t *w)
+void world_handle_touches(ivl_sim_group_t *group, ivl_mask_t which)
 {
-    bool loose = true;
-    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    ivl_mask_t open = ~(ivl_mask_t){0};
+    for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
-        loose = loose & (w->foot[i] == IVL_SIM_FOOT_FREE) & !w->detached[i];
+        open &= group->progress.gap_m[i] > tolerance_m(i);  // positive form: a gap that is no number has been passed
     }
-    return loose;
+    const ivl_mask_t touches = which & ~open;
+    for (int lane = 0; lane < IVL_SIM_LANES && ivl_mask_any(touches); lane++)
+    {
+        if (touches[lane])
+        {
+            touch(group, lane);
+        }
+    }
 }
 
-bool world_handle_held(ivl_sim_group_t *group, int lane)
+/// The held and the detached feet of a world.
+static bool look_at_feet(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t        *w = &group->world[lane];
     const ivl_sim_params_t *raw = &w->model->raw;
+    const double            t_s = ivl_sim_world_time_s(group, lane);
     bool                    event = false;
-    if (all_loose(w))
-    {
-        return false;
-    }
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
         const double pull = group->rate.pull_N[i][lane];
@@ -224,7 +237,8 @@ bool world_handle_held(ivl_sim_group_t *group, int lane)
             w->detached[i] = true;
             event = true;
         }
-        else if (w->foot[i] == IVL_SIM_FOOT_SLIDING && w->t_s >= w->t_touch_s[i] + raw->leg_stick_delay_s - IVL_SIM_TIME_SLACK_S)
+        else if (w->foot[i] == IVL_SIM_FOOT_SLIDING &&
+                 t_s >= group->touch.t_touch_s[i][lane] + raw->leg_stick_delay_s - IVL_SIM_TIME_SLACK_S)
         {
             hold(group, lane, i, IVL_SIM_FOOT_STUCK);
             stop_held_feet(group, lane);
@@ -232,13 +246,32 @@ bool world_handle_held(ivl_sim_group_t *group, int lane)
         }
         else if (w->detached[i])
         {
-            const double gap = foot_gap(w, &group->state, lane, ivl_sim_world_surface_m(w, w->t_s), i);
+            const double gap = foot_gap(w->model, &group->state, world_surface_m(group, group->progress.t_s), i)[lane];
             w->detached[i] = !(gap > REARM_GAP_M);
         }
     }
+    ivl_sim_world_note_contact(group, lane);
     if (event)
     {
-        world_restart_step(w, &group->state, lane);
+        world_restart_step(group, lane);
+    }
+    return event;
+}
+
+ivl_mask_t world_handle_held(ivl_sim_group_t *group, ivl_mask_t which)
+{
+    ivl_mask_t changes = group->touch.sliding | group->touch.detached, event = {0};
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        changes |= group->rate.pull_N[i] > group->touch.hold_N[i];
+    }
+    changes &= which;
+    for (int lane = 0; lane < IVL_SIM_LANES && ivl_mask_any(changes); lane++)
+    {
+        if (changes[lane] && look_at_feet(group, lane))
+        {
+            event[lane] = -1;
+        }
     }
     return event;
 }

@@ -11,6 +11,7 @@
 #include "phys_rotor.h"
 #include "phys_state.h"
 #include "sim_autopilot.h"
+#include "world_drive.h"
 #include "world_sensors.h"
 
 enum
@@ -26,49 +27,59 @@ typedef struct
     ivl_sim_kin_t kin;
 } ivl_sim_impact_t;
 
-/// The step that is being tried.
+/// How far each world is, and the steps by which it goes on.
 typedef struct
 {
-    double          dt_s;
-    bool            powered;                    ///< some rotor turns
-    ivl_sim_rotor_t rotor;                      ///< after the step, if powered
-    double          gap_m[IVL_SIM_GAPS];        ///< before the step
-    double          gap_after_m[IVL_SIM_GAPS];  ///< after it; before the next
-    int             n_try;                      ///< 0 at first; more while a contact is being located
-    bool            starting;                   ///< evaluates only: the forces have jumped
-} ivl_sim_trial_t;
+    ivl_wide_t  t_s;
+    ivl_wide_t  left_s;            ///< of the present tick; 0 in an empty lane
+    ivl_whole_t n_step;            ///< integration steps since the start
+    ivl_whole_t n_evaluation;      ///< evaluations of the forces since the start: steps and tries
+    ivl_whole_t evaluations_left;  ///< of the present tick
+    ivl_wide_t  graded_s;          ///< next integration step, graded after events
+    ivl_wide_t  step_s;            ///< the same, or what the legs allow if that is shorter
+    ivl_mask_t  restart;           ///< the forces have jumped since the last evaluation
+    ivl_wide_t  surface_m;         ///< height of the surface at time 0
+    ivl_wide_t  d_min_m;           ///< smallest distance of the body origin from the surface
+    // the step that is being tried
+    ivl_wide_t       dt_s;
+    ivl_mask_t       starting;                   ///< evaluates only: the forces have jumped
+    ivl_mask_t       powered;                    ///< some rotor turns
+    ivl_sim_rotors_t rotor;                      ///< after the step, if powered
+    ivl_whole_t      n_try;                      ///< 0 at first; more while a contact is being located
+    ivl_wide_t       gap_m[IVL_SIM_GAPS];        ///< before the step
+    ivl_wide_t       gap_after_m[IVL_SIM_GAPS];  ///< after it; before the next
+} ivl_sim_progress_t;
+
+/// What the feet and plates of each world do, as far as each step asks for it: see ivl_sim_world_note_contact.
+typedef struct
+{
+    ivl_mask_t may_touch[IVL_SIM_GAPS];  ///< a foot that may stick, a plate that has not touched yet
+    ivl_wide_t hold_N[IVL_SIM_LEGS];     ///< pull up to which a foot is held; unlimited where none is
+    ivl_wide_t t_touch_s[IVL_SIM_LEGS];  ///< since when a sliding foot presses
+    ivl_mask_t sliding;                  ///< some foot
+    ivl_mask_t detached;                 ///< likewise
+    ivl_mask_t all_stuck;                ///< all feet
+    ivl_mask_t impacted;                 ///< something has touched
+} ivl_sim_touch_t;
 
 typedef struct
 {
     const ivl_sim_model_t *model;
     ivl_sim_rng_t          rng;
-    double                 t_s;
-    double                 surface_m, surface_mps;         ///< height of the surface at time 0, and how fast it rises
-    double                 left_s;                         ///< of the present tick
     uint32_t               n_tick;                         ///< ticks of the flight core since the start
-    uint32_t               n_step;                         ///< integration steps since the start
-    uint32_t               n_evaluation;                   ///< evaluations of the forces since the start: steps and tries
-    uint32_t               evaluations_left;               ///< of the present tick
     bool                   gave_up;                        ///< a tick took more than it can have: what follows is no motion
     uint32_t               n_approach_tick, n_valid_tick;  ///< ticks of the approach, and those with a valid distance
-    double                 graded_s;                       ///< next integration step, graded after events
-    double                 step_s;                         ///< the same, or what the legs allow if that is shorter
-    bool                   restart;                        ///< the forces have jumped since the last evaluation
     ivl_sim_foot_t         foot[IVL_SIM_LEGS];
-    ivl_sim_trial_t        trial;
-    ivl_sim_rotor_t        rotor;
     ivl_sim_sensors_t      sensors;
     ivl_state_t            firmware;
     ivl_in_t               in;  ///< what the sensors say, and the command
     ivl_sim_autopilot_t    autopilot;
     ivl_out_t              out;
     ivl_sim_impact_t       impact;
-    double                 t_touch_s[IVL_SIM_LEGS];    ///< since when a sliding foot presses
     bool                   detached[IVL_SIM_LEGS];     ///< came off; cannot stick again before it has moved away
     int8_t                 stuck_order[IVL_SIM_LEGS];  ///< leg numbers 1..4 in the order of first sticking, 0 none
     int                    n_order;
     bool                   plate_touched[IVL_SIM_PLATES];
-    double                 d_min_m;  ///< smallest distance of the body origin from the surface
 } ivl_sim_world_t;
 
 typedef struct
@@ -79,7 +90,10 @@ typedef struct
     ivl_sim_rate_t         last, rate;
     ivl_sim_contact_t      contact;
     ivl_sim_load_t         load;
-    ivl_wide_t             dt_s;
+    ivl_sim_rotors_t       rotor;
+    ivl_sim_progress_t     progress;
+    ivl_sim_touch_t        touch;
+    ivl_sim_drive_t        drive;
     bool                   active[IVL_SIM_LANES];
     ivl_sim_world_t        world[IVL_SIM_LANES];
 } ivl_sim_group_t;
@@ -112,8 +126,17 @@ void ivl_sim_world_rest_legs(const ivl_sim_model_t *model, ivl_sim_kin_t *kin);
 /// Within a tick: this tick becomes the first one, at time 0, of a vehicle that has touched nothing yet.  Motion and sensors go on.
 void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane);
 
-/// Height of the surface along its normal.
-double ivl_sim_world_surface_m(const ivl_sim_world_t *world, double t_s);
+/// After a change of what a world's feet and plates do.
+void ivl_sim_world_note_contact(ivl_sim_group_t *group, int lane);
+
+/// Time since the start.
+IVL_SIM_INLINE double ivl_sim_world_time_s(const ivl_sim_group_t *group, int lane)
+{
+    return group->progress.t_s[lane];
+}
+
+/// Height of the surface along its normal, at present.
+double ivl_sim_world_surface_m(const ivl_sim_group_t *group, int lane);
 
 /// Distance of the body origin from the surface, at present.
 double ivl_sim_world_gap_m(const ivl_sim_group_t *group, int lane);
@@ -121,7 +144,10 @@ double ivl_sim_world_gap_m(const ivl_sim_group_t *group, int lane);
 /// State of motion of one vehicle.
 ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane);
 
-/// A tick of the flight core (skipped while its motors are latched off); the motion until the next one is then due.
+/// A tick of the flight core (skipped while its motors are latched off) in each lane in which one is due; the motion until the next one then is.
+void ivl_sim_world_ticks(ivl_sim_group_t *group, const bool due[IVL_SIM_LANES]);
+
+/// The same for one lane.
 void ivl_sim_world_tick(ivl_sim_group_t *group, int lane);
 
 /// True when the motion that was due is done: the next tick can begin.

@@ -8,10 +8,11 @@ typedef struct
 } seat_t;
 
 /// Tells the core where to be.
-static void request(seat_t *seat, ivl_sim_world_t *world)
+static void request(seat_t *seat, ivl_sim_group_t *group, int lane)
 {
+    ivl_sim_world_t       *world = &group->world[lane];
     const ivl_sim_hover_t *flight = seat->flight;
-    while (seat->n_reached < flight->n_setpoint && flight->setpoint[seat->n_reached].t_s <= world->t_s + 1.0e-9)
+    while (seat->n_reached < flight->n_setpoint && flight->setpoint[seat->n_reached].t_s <= ivl_sim_world_time_s(group, lane) + 1.0e-9)
     {
         const double *p = flight->setpoint[seat->n_reached].p_W_m;
         world->in.cmd.request = IVL_REQUEST_HOVER;
@@ -23,7 +24,7 @@ static void request(seat_t *seat, ivl_sim_world_t *world)
 /// The row that is due, if one is.
 static void record(const ivl_sim_group_t *group, int lane, double period_s, seat_t *seat)
 {
-    if (group->world[lane].t_s >= (double)seat->n_row * period_s - 1.0e-9)
+    if (ivl_sim_world_time_s(group, lane) >= (double)seat->n_row * period_s - 1.0e-9)
     {
         ivl_sim_rollout_row(group, lane, &seat->flight->rows[seat->n_row]);
         seat->n_row++;
@@ -36,7 +37,7 @@ static void take_seat(ivl_sim_group_t *group, int lane, const ivl_sim_hover_t *f
     *seat = (seat_t){flight, 0, 0};
     ivl_sim_world_start(group, lane, &flight->rng, flight->setpoint[0].p_W_m, still);
     record(group, lane, period_s, seat);
-    request(seat, &group->world[lane]);
+    request(seat, group, lane);
     ivl_sim_world_tick(group, lane);
 }
 
@@ -57,12 +58,12 @@ static bool goes_on(ivl_sim_group_t *group, int lane, double period_s, size_t n_
     {
         return false;
     }
-    request(seat, &group->world[lane]);
+    request(seat, group, lane);
     ivl_sim_world_tick(group, lane);
     return true;
 }
 
-void ivl_sim_hover(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n, double period_s, size_t n_rows)
+void IVL_SIM_OF_WIDTH(ivl_sim_hover)(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n, double period_s, size_t n_rows)
 {
     ivl_sim_group_t group;
     seat_t          seat[IVL_SIM_LANES];

@@ -22,5 +22,7 @@ typedef struct
 
 /// Flies n flights, several at a time.  Each one's rows depend on it alone.  When a motion ceases to be one, t_s of the rows that are left is NaN.
 void ivl_sim_hover(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n, double period_s, size_t n_rows);
+void IVL_SIM_OF_WIDTH(ivl_sim_hover)(const ivl_sim_model_t *model, const ivl_sim_hover_t *flights, size_t n, double period_s,
+                                     size_t n_rows);
 
 #endif  // IVL_WORLD_HOVER_H

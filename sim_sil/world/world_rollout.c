@@ -166,17 +166,19 @@ void ivl_sim_outcome_clear(ivl_sim_outcome_t *o)
 }
 
 /// Truth at the tick at which the flight core triggered, and what it saw.
-static void note_trigger(const ivl_sim_kin_t *before, const ivl_sim_world_t *world, ivl_sim_outcome_t *o)
+static void note_trigger(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
 {
+    const ivl_sim_world_t  *world = &group->world[lane];
+    const ivl_sim_kin_t     now = ivl_sim_world_kin(group, lane), *before = &now;
     const ivl_state_t      *firmware = &world->firmware;
     const ivl_sim_params_t *raw = &world->model->raw;
     o->triggered[0] = 1;
-    o->t_trigger_s[0] = world->t_s;
+    o->t_trigger_s[0] = ivl_sim_world_time_s(group, lane);
     o->vx_trigger_mps[0] = before->v_WB_mps[0];
     o->vz_trigger_mps[0] = before->v_WB_mps[2];
     o->rate_trigger_radps[0] = -before->w_B_radps[1];
     o->d_trigger_m[0] = (double)firmware->snapshot.d_ceil_m;
-    o->d_true_trigger_m[0] = ivl_sim_world_surface_m(world, world->t_s) + raw->world_sensed_gap_offset_m -
+    o->d_true_trigger_m[0] = ivl_sim_world_surface_m(group, lane) + raw->world_sensed_gap_offset_m -
                              ivl_sim_surface_height_of(&world->model->surface, ivl_d3_load(before->p_WB_m));
     o->d_sigma_trigger_m[0] = (double)firmware->snapshot.d_sigma_m;
     o->rrev_trigger[0] = (double)firmware->snapshot.rrev_per_s;
@@ -192,15 +194,17 @@ static double pitch_deg(const ivl_sim_kin_t *kin)
     return (angle + 2.0 * IVL_SIM_PI * turns) * (180.0 / IVL_SIM_PI);
 }
 
-static void note_end(const ivl_sim_world_t *world, ivl_sim_end_t end, ivl_sim_outcome_t *o)
+static void note_end(const ivl_sim_group_t *group, int lane, ivl_sim_end_t end, ivl_sim_outcome_t *o)
 {
+    const ivl_sim_world_t    *world = &group->world[lane];
+    const ivl_sim_progress_t *progress = &group->progress;
     o->end_reason[0] = (int32_t)end;
-    o->t_end_s[0] = world->t_s;
+    o->t_end_s[0] = progress->t_s[lane];
     o->n_legs[0] = ivl_sim_world_count_stuck(world);
     memcpy(o->leg_order, world->stuck_order, sizeof o->leg_order);
     o->body_contact[0] = world->plate_touched[IVL_SIM_PROP_PLATE] ? 1 : 0;
     o->base_contact[0] = world->plate_touched[IVL_SIM_BASE_PLATE] ? 1 : 0;
-    o->d_min_m[0] = world->d_min_m;
+    o->d_min_m[0] = progress->d_min_m[lane];
     const ivl_decision_t *decision = &world->firmware.decision;
     if (decision->made)
     {
@@ -209,7 +213,7 @@ static void note_end(const ivl_sim_world_t *world, ivl_sim_end_t end, ivl_sim_ou
         o->p_land[0] = (double)decision->p_land;
         o->d_decided_m[0] = (double)decision->d_ceil_m;
     }
-    o->n_steps[0] = world->n_step;
+    o->n_steps[0] = (uint32_t)progress->n_step[lane];
     o->n_ticks[0] = world->n_tick;
     if (world->n_approach_tick > 0)
     {
@@ -253,13 +257,13 @@ static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_
 {
     const ivl_sim_world_t  *world = &group->world[lane];
     const ivl_sim_params_t *raw = &world->model->raw;
-    const double            slack = 1.0e-9;
+    const double            slack = 1.0e-9, t_s = ivl_sim_world_time_s(group, lane);
     if (ivl_sim_world_diverged(&group->state, lane))
     {
         *end = IVL_SIM_END_NOT_FINITE;
         return true;
     }
-    if (world->gave_up || world->n_evaluation >= IVL_SIM_EVALUATIONS_MAX)
+    if (world->gave_up || group->progress.n_evaluation[lane] >= IVL_SIM_EVALUATIONS_MAX)
     {
         *end = IVL_SIM_END_STEP_LIMIT;
         return true;
@@ -267,14 +271,14 @@ static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_
     if (world->impact.happened)
     {
         *end = IVL_SIM_END_CONTACT_TIME;
-        return world->t_s >= world->impact.t_s + raw->end_contact_time_s - slack;
+        return t_s >= world->impact.t_s + raw->end_contact_time_s - slack;
     }
-    if (world->t_s >= raw->end_time_max_s - slack)
+    if (t_s >= raw->end_time_max_s - slack)
     {
         *end = IVL_SIM_END_TIME_MAX;
         return true;
     }
-    if (o->triggered[0] && world->t_s >= o->t_trigger_s[0] + raw->end_missed_time_s - slack)
+    if (o->triggered[0] && t_s >= o->t_trigger_s[0] + raw->end_missed_time_s - slack)
     {
         *end = IVL_SIM_END_MISSED_TIME;
         return true;
@@ -290,7 +294,7 @@ static bool ended(const ivl_sim_group_t *group, int lane, const ivl_sim_outcome_
         return false;
     }
     const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
-    return out_of_reach(world->model, &kin, ivl_sim_world_surface_m(world, world->t_s));
+    return out_of_reach(world->model, &kin, ivl_sim_world_surface_m(group, lane));
 }
 
 void ivl_sim_rollout_row(const ivl_sim_group_t *group, int lane, ivl_sim_trace_t *row)
@@ -299,7 +303,7 @@ void ivl_sim_rollout_row(const ivl_sim_group_t *group, int lane, ivl_sim_trace_t
     const ivl_sim_model_t *model = w->model;
     const ivl_sim_kin_t    body = ivl_sim_world_kin(group, lane), *kin = &body;
     memset(row, 0, sizeof *row);
-    row->t_s[0] = w->t_s;
+    row->t_s[0] = ivl_sim_world_time_s(group, lane);
     memcpy(row->p_WB_m, kin->p_WB_m, sizeof row->p_WB_m);
     memcpy(row->q_WB, kin->q_WB, sizeof row->q_WB);
     memcpy(row->v_WB_mps, kin->v_WB_mps, sizeof row->v_WB_mps);
@@ -307,11 +311,11 @@ void ivl_sim_rollout_row(const ivl_sim_group_t *group, int lane, ivl_sim_trace_t
     row->pitch_deg[0] = pitch_deg(kin);
     for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
-        const double speed = w->rotor.speed_radps[i];
-        row->thrust_N[i] = w->rotor.scatter[i] * model->raw.rotor_thrust_constant_Ns2 * speed * speed;
+        const double speed = group->rotor.speed_radps[i][lane];
+        row->thrust_N[i] = group->rotor.scatter[i][lane] * model->raw.rotor_thrust_constant_Ns2 * speed * speed;
         row->thrust_cmd_N[i] = (double)w->out.thrust_N[i];
     }
-    row->battery_V[0] = (w->rotor.open_circuit_V > 0.0) ? ivl_sim_rotor_voltage(model, &w->rotor) : 0.0;
+    row->battery_V[0] = (group->rotor.open_circuit_V[lane] > 0.0) ? ivl_sim_rotor_voltage(model, &group->rotor, lane) : 0.0;
     for (int leg = 0; leg < IVL_SIM_LEGS; leg++)
     {
         for (int axis = 0; axis < 3; axis++)
@@ -327,14 +331,13 @@ void ivl_sim_rollout_row(const ivl_sim_group_t *group, int lane, ivl_sim_trace_t
     row->d_sigma_m[0] = (double)w->out.ceiling.d_sigma_m;
     row->rrev_per_s[0] = (double)w->out.cues.rrev_per_s;
     row->of_y_radps[0] = (double)w->out.cues.of_y_radps;
-    row->energy_J[0] = ivl_sim_energy(model, kin, ivl_sim_world_surface_m(w, w->t_s));
+    row->energy_J[0] = ivl_sim_energy(model, kin, ivl_sim_world_surface_m(group, lane));
 }
 
 /// A row for each period that has begun; rows stand at ticks of the flight core.
 static void trace(ivl_sim_tracer_t *tracer, const ivl_sim_group_t *group, int lane)
 {
-    const ivl_sim_world_t *world = &group->world[lane];
-    if (tracer == NULL || world->t_s < (double)tracer->n * tracer->period_s - 1.0e-9)
+    if (tracer == NULL || ivl_sim_world_time_s(group, lane) < (double)tracer->n * tracer->period_s - 1.0e-9)
     {
         return;
     }
@@ -350,15 +353,8 @@ void ivl_sim_rollout_note(const ivl_sim_group_t *group, int lane, ivl_sim_outcom
     const ivl_sim_world_t *world = &group->world[lane];
     if (world->firmware.triggered && !o->triggered[0])
     {
-        const ivl_sim_kin_t kin = ivl_sim_world_kin(group, lane);
-        note_trigger(&kin, world, o);
+        note_trigger(group, lane, o);
     }
-}
-
-static void tick(ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
-{
-    ivl_sim_world_tick(group, lane);
-    ivl_sim_rollout_note(group, lane, o);
 }
 
 bool ivl_sim_rollout_ended(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
@@ -367,7 +363,7 @@ bool ivl_sim_rollout_ended(const ivl_sim_group_t *group, int lane, ivl_sim_outco
     const bool    is_over = ended(group, lane, o, &end);
     if (is_over)
     {
-        note_end(&group->world[lane], end, o);
+        note_end(group, lane, end, o);
     }
     return is_over;
 }
@@ -386,7 +382,7 @@ bool ivl_sim_spec_good(const ivl_sim_spec_t *spec)
     return good;
 }
 
-/// Puts the next landing of the source into a lane; the lane stays empty if there is none.
+/// Puts the next landing of the source into a lane, whose first tick is then due; the lane stays empty if there is none.
 static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
 {
     group->active[lane] = false;
@@ -401,7 +397,6 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
         else if (ivl_sim_rollout_start(group, lane, job->spec))
         {
             trace(job->tracer, group, lane);
-            tick(group, lane, job->outcome);
         }
         else
         {
@@ -412,45 +407,62 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
     }
 }
 
-/// What happens between two ticks.
-static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job)
+/// What happens between two ticks, of which the second is then due if there is a landing in the lane.
+static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, void *context, ivl_sim_job_t *job,
+                          ivl_sim_work_t *work)
 {
     trace(job->tracer, group, lane);
     if (ivl_sim_rollout_ended(group, lane, job->outcome))
     {
+        work->used += (uint64_t)group->progress.n_evaluation[lane];
         refill(group, lane, source, context, job);
-    }
-    else
-    {
-        tick(group, lane, job->outcome);
     }
 }
 
-void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
+static void tick(ivl_sim_group_t *group, const bool due[IVL_SIM_LANES], const ivl_sim_job_t job[IVL_SIM_LANES])
+{
+    ivl_sim_world_ticks(group, due);
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    {
+        if (due[lane])
+        {
+            ivl_sim_rollout_note(group, lane, job[lane].outcome);
+        }
+    }
+}
+
+ivl_sim_work_t IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context)
 {
     ivl_sim_group_t group;
     ivl_sim_job_t   job[IVL_SIM_LANES];
-    bool            any = false;
+    bool            due[IVL_SIM_LANES], any = false;
+    ivl_sim_work_t  work = {0, 0};
     ivl_sim_group_init(model, &group);
     group.port = model->core.open(model->core.context);
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
         refill(&group, lane, source, context, &job[lane]);
-        any = any || group.active[lane];
+        due[lane] = group.active[lane];
+        any = any || due[lane];
     }
     while (any)
     {
+        tick(&group, due, job);
         // ends: a tick takes a bounded number of steps, time counts ticks, and a landing ends by its time at the latest
         ivl_sim_group_step(&group);
+        work.offered += IVL_SIM_LANES;
         any = false;
         for (int lane = 0; lane < IVL_SIM_LANES; lane++)
         {
-            if (group.active[lane] && ivl_sim_world_ready(&group, lane))
+            due[lane] = group.active[lane] && ivl_sim_world_ready(&group, lane);
+            if (due[lane])
             {
-                between_ticks(&group, lane, source, context, &job[lane]);
+                between_ticks(&group, lane, source, context, &job[lane], &work);
+                due[lane] = group.active[lane];
             }
             any = any || group.active[lane];
         }
     }
     model->core.close(group.port);
+    return work;
 }

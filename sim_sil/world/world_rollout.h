@@ -135,8 +135,15 @@ typedef struct
 /// Gives the next landing to fly; false when there are no more.
 typedef bool (*ivl_sim_source_t)(void *context, ivl_sim_job_t *job);
 
+/// Evaluations that the lanes could have made, and those that landings asked for: their quotient is the occupancy.
+typedef struct
+{
+    uint64_t offered, used;
+} ivl_sim_work_t;
+
 /// Flies all landings of a source, several at a time.  Each outcome depends on its spec alone.
-void ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
+ivl_sim_work_t ivl_sim_fly(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
+ivl_sim_work_t IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_sim_source_t source, void *context);
 
 // The parts of ivl_sim_fly, for a world that goes on before and after its landings.
 

@@ -13,7 +13,7 @@ void ivl_sim_world_rest_legs(const ivl_sim_model_t *model, ivl_sim_kin_t *kin)
     }
 }
 
-static void draw_scatter(ivl_sim_world_t *w)
+static void draw_scatter(const ivl_sim_world_t *w, ivl_sim_rotors_t *rotor, int lane)
 {
     const double sigma = w->model->raw.rotor_thrust_scatter_norm;
     if (sigma > 0.0)
@@ -23,25 +23,25 @@ static void draw_scatter(ivl_sim_world_t *w)
         for (int i = 0; i < IVL_SIM_MOTORS; i++)
         {
             const double factor = 1.0 + sigma * n[i];
-            w->rotor.scatter[i] = (factor > 0.0) ? factor : 0.0;
+            rotor->scatter[i][lane] = (factor > 0.0) ? factor : 0.0;
         }
     }
 }
 
 /// Open-circuit voltage of this rollout: the one given, or drawn about the model's.
-static void draw_battery(ivl_sim_world_t *w, double battery_V)
+static void draw_battery(const ivl_sim_world_t *w, ivl_sim_rotors_t *rotor, int lane, double battery_V)
 {
     const ivl_sim_params_t *raw = &w->model->raw;
     if (battery_V > 0.0)
     {
-        w->rotor.open_circuit_V = battery_V;
+        rotor->open_circuit_V[lane] = battery_V;
     }
     else if (raw->battery_voltage_V > 0.0 && raw->battery_voltage_scatter_V > 0.0)
     {
         double n[4];
         ivl_sim_normal4(&w->rng, IVL_SIM_DRAW_BATTERY, 0, n);
         const double drawn = raw->battery_voltage_V + raw->battery_voltage_scatter_V * n[0];
-        w->rotor.open_circuit_V = (drawn > LEAST_V) ? drawn : LEAST_V;
+        rotor->open_circuit_V[lane] = (drawn > LEAST_V) ? drawn : LEAST_V;
     }
 }
 
@@ -59,7 +59,7 @@ void ivl_sim_group_init(const ivl_sim_model_t *model, ivl_sim_group_t *group)
         // an empty lane is computed along with the others: it must hold numbers, and be away from the surface
         ivl_sim_lane_set(&group->state, lane, &resting);
         ivl_sim_contact_set(model, &group->contact, lane, free_feet);
-        group->load.surface_height_m[lane] = ivl_sim_surface_height_of(&model->surface, ivl_d3_load(resting.p_WB_m)) + 2.0 * model->reach_m;
+        group->progress.surface_m[lane] = ivl_sim_surface_height_of(&model->surface, ivl_d3_load(resting.p_WB_m)) + 2.0 * model->reach_m;
     }
 }
 
@@ -67,20 +67,46 @@ void ivl_sim_world_place(ivl_sim_group_t *group, int lane, const ivl_sim_kin_t *
 {
     ivl_sim_world_t *w = &group->world[lane];
     ivl_sim_lane_set(&group->state, lane, kin);
-    w->restart = true;
+    group->progress.restart[lane] = -1;
+    group->progress.n_try[lane] = 0;
     w->gave_up = false;
-    w->d_min_m = ivl_sim_world_gap_m(group, lane);
+    group->progress.d_min_m[lane] = ivl_sim_world_gap_m(group, lane);
+    ivl_sim_world_note_contact(group, lane);
 }
 
-double ivl_sim_world_surface_m(const ivl_sim_world_t *w, double t_s)
+void ivl_sim_world_note_contact(ivl_sim_group_t *group, int lane)
 {
-    return w->surface_m + t_s * w->surface_mps;
+    const ivl_sim_world_t *w = &group->world[lane];
+    ivl_sim_touch_t       *touch = &group->touch;
+    bool                   sliding = false, detached = false, all_stuck = true;
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        const bool is_free = w->foot[i] == IVL_SIM_FOOT_FREE, is_stuck = w->foot[i] == IVL_SIM_FOOT_STUCK;
+        touch->may_touch[i][lane] = (is_free && !w->detached[i]) ? -1 : 0;
+        touch->hold_N[i][lane] = is_stuck ? w->model->raw.leg_adhesion_N : (is_free ? (double)INFINITY : 0.0);
+        sliding = sliding || (w->foot[i] == IVL_SIM_FOOT_SLIDING);
+        detached = detached || w->detached[i];
+        all_stuck = all_stuck && is_stuck;
+    }
+    for (int i = 0; i < IVL_SIM_PLATES; i++)
+    {
+        touch->may_touch[IVL_SIM_LEGS + i][lane] = w->plate_touched[i] ? 0 : -1;
+    }
+    touch->sliding[lane] = sliding ? -1 : 0;
+    touch->detached[lane] = detached ? -1 : 0;
+    touch->all_stuck[lane] = all_stuck ? -1 : 0;
+    touch->impacted[lane] = w->impact.happened ? -1 : 0;
+}
+
+double ivl_sim_world_surface_m(const ivl_sim_group_t *group, int lane)
+{
+    return group->progress.surface_m[lane] + group->progress.t_s[lane] * ivl_sim_surface_speed(&group->model->surface);
 }
 
 double ivl_sim_world_gap_m(const ivl_sim_group_t *group, int lane)
 {
-    const ivl_sim_world_t *w = &group->world[lane];
-    return ivl_sim_world_surface_m(w, w->t_s) - ivl_sim_surface_height_of(&w->model->surface, ivl_w3_lane(&group->state.p_WB_m, lane));
+    return ivl_sim_world_surface_m(group, lane) -
+           ivl_sim_surface_height_of(&group->model->surface, ivl_w3_lane(&group->state.p_WB_m, lane));
 }
 
 ivl_sim_kin_t ivl_sim_world_kin(const ivl_sim_group_t *group, int lane)
@@ -123,6 +149,25 @@ static void turn_legs(ivl_sim_kin_t *kin)
     }
 }
 
+/// A world at time 0 that has taken no step and touched nothing.
+static void begin(ivl_sim_group_t *group, int lane)
+{
+    const ivl_sim_model_t *model = group->model;
+    ivl_sim_progress_t    *progress = &group->progress;
+    progress->t_s[lane] = 0.0;
+    progress->left_s[lane] = 0.0;
+    progress->n_step[lane] = 0;
+    progress->n_evaluation[lane] = 0;
+    progress->evaluations_left[lane] = 0;
+    progress->graded_s[lane] = model->raw.step_flight_s * model->raw.step_scale_norm;
+    progress->step_s[lane] = progress->graded_s[lane];
+    progress->surface_m[lane] = ivl_sim_surface_height(&model->surface, 0.0);
+    for (int i = 0; i < IVL_SIM_LEGS; i++)
+    {
+        group->touch.t_touch_s[i][lane] = 0.0;
+    }
+}
+
 void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rng_t *rng, const ivl_sim_start_state_t *start)
 {
     const ivl_sim_model_t *model = group->model;
@@ -139,16 +184,12 @@ void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rn
     memset(w, 0, sizeof *w);
     w->model = model;
     w->rng = *rng;
-    w->surface_m = ivl_sim_surface_height(&model->surface, 0.0);
-    w->surface_mps = ivl_sim_surface_speed(&model->surface);
-    w->graded_s = model->raw.step_flight_s * model->raw.step_scale_norm;
-    w->step_s = w->graded_s;
+    begin(group, lane);
     ivl_sim_contact_set(model, &group->contact, lane, w->foot);
-    ivl_sim_rotor_init(model, &w->rotor);
-    memcpy(w->rotor.speed_radps, start->rotor_radps, sizeof w->rotor.speed_radps);
-    memcpy(w->rotor.command_radps, start->rotor_radps, sizeof w->rotor.command_radps);
-    draw_scatter(w);
-    draw_battery(w, start->battery_V);
+    ivl_sim_rotor_init(model, &group->rotor, lane);
+    ivl_sim_rotor_set(&group->rotor, lane, start->rotor_radps);
+    draw_scatter(w, &group->rotor, lane);
+    draw_battery(w, &group->rotor, lane, start->battery_V);
     ivl_sim_sensors_init(model, rng, &kin, &w->sensors);
     model->core.init(group->port, lane, &model->firmware, &w->firmware);
     // accelerations of the vehicle that was in this lane before must not reach the new one: what is no number would, even
@@ -162,7 +203,7 @@ void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane)
 {
     ivl_sim_world_t   *w = &group->world[lane];
     ivl_sim_sensors_t *s = &w->sensors;
-    const double       past_s = w->t_s;
+    const double       past_s = ivl_sim_world_time_s(group, lane);
     s->next_s -= past_s;
     s->held.t_s -= past_s;
     for (int i = 0; i < IVL_SIM_POSE_QUEUE; i++)
@@ -171,16 +212,17 @@ void ivl_sim_world_rebase(ivl_sim_group_t *group, int lane)
     }
     for (int i = 0; i < IVL_SIM_LEGS; i++)
     {
-        w->t_touch_s[i] -= past_s;
+        group->touch.t_touch_s[i][lane] -= past_s;
         w->stuck_order[i] = 0;
     }
-    w->surface_m = ivl_sim_world_surface_m(w, past_s);
-    w->t_s = 0.0;
+    group->progress.surface_m[lane] = ivl_sim_world_surface_m(group, lane);
+    group->progress.t_s[lane] = 0.0;
+    group->progress.n_step[lane] = 0;
+    group->progress.n_evaluation[lane] = 0;
     w->n_tick = 1;
-    w->n_step = 0;
-    w->n_evaluation = 0;
     w->n_order = 0;
     w->impact = (ivl_sim_impact_t){.happened = false};
     memset(w->plate_touched, 0, sizeof w->plate_touched);
-    w->d_min_m = ivl_sim_world_gap_m(group, lane);
+    group->progress.d_min_m[lane] = ivl_sim_world_gap_m(group, lane);
+    ivl_sim_world_note_contact(group, lane);
 }

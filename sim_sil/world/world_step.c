@@ -5,176 +5,164 @@
 #include "world_pace.h"
 #include "world_step_size.h"
 
-/// Sets up lane `lane` for a step of length dt.
-static void propose(ivl_sim_group_t *group, int lane, double dt)
+/// Sets up all lanes for a step of progress.dt_s.
+static void propose(ivl_sim_group_t *group)
 {
-    ivl_sim_world_t *w = &group->world[lane];
-    ivl_sim_thrust_t thrust = {0.0, {0.0, 0.0, 0.0}};
-    w->trial.dt_s = dt;
-    w->trial.powered = !ivl_sim_rotor_still(&w->rotor);
-    if (w->trial.powered)
+    ivl_sim_progress_t     *progress = &group->progress;
+    ivl_sim_load_t         *load = &group->load;
+    const ivl_sim_state_t  *s = &group->state;
+    const ivl_wide_t        height = ivl_sim_surface_heights_of(&group->model->surface, s->p_WB_m);
+    const ivl_sim_airflow_t flow = {world_surface_m(group, progress->t_s) - height, &s->v_WB_mps, s->q_WB};
+    const ivl_wide_t        none = ivl_wide(0.0);
+    const ivl_mask_t        powered = ivl_sim_rotor_turn(&group->rotor);
+    progress->powered = powered;
+    load->surface_height_m = world_surface_m(group, progress->t_s + 0.5 * progress->dt_s);
+    if (ivl_mask_any(powered))
     {
-        const ivl_sim_state_t  *s = &group->state;
-        const ivl_sim_airflow_t body = {.gap_m = ivl_sim_world_gap_m(group, lane),
-                                        .v_W_mps = {s->v_WB_mps.x[lane], s->v_WB_mps.y[lane], s->v_WB_mps.z[lane]},
-                                        .q_WB = {s->q_WB[0][lane], s->q_WB[1][lane], s->q_WB[2][lane], s->q_WB[3][lane]}};
-        w->trial.rotor = w->rotor;
-        thrust = ivl_sim_rotor_step(w->model, &w->trial.rotor, &body, dt);
+        ivl_sim_rotor_step(group->model, &group->rotor, &flow, &progress->dt_s, &progress->rotor, load);
     }
-    group->dt_s[lane] = dt;
-    group->load.surface_height_m[lane] = ivl_sim_world_surface_m(w, w->t_s + 0.5 * dt);
-    group->load.thrust_N[lane] = thrust.thrust_N;
-    group->load.torque_B_Nm.x[lane] = thrust.torque_B_Nm[0];
-    group->load.torque_B_Nm.y[lane] = thrust.torque_B_Nm[1];
-    group->load.torque_B_Nm.z[lane] = thrust.torque_B_Nm[2];
+    load->thrust_N = ivl_wide_select(powered, load->thrust_N, none);
+    load->torque_B_Nm.x = ivl_wide_select(powered, load->torque_B_Nm.x, none);
+    load->torque_B_Nm.y = ivl_wide_select(powered, load->torque_B_Nm.y, none);
+    load->torque_B_Nm.z = ivl_wide_select(powered, load->torque_B_Nm.z, none);
 }
 
-static void begin_step(ivl_sim_group_t *group, int lane)
+/// @param[in] which  lanes in which a step begins
+static void begin_step(ivl_sim_group_t *group, ivl_mask_t which)
 {
-    ivl_sim_world_t *w = &group->world[lane];
-    if (w->restart)
+    ivl_sim_progress_t *progress = &group->progress;
+    const ivl_mask_t    anew = which & progress->restart;
+    for (int i = 0; i < IVL_SIM_GAPS; i++)
     {
-        world_gaps(w, &group->state, lane, w->t_s, w->trial.gap_m);
+        progress->gap_m[i] = ivl_wide_select(which, progress->gap_after_m[i], progress->gap_m[i]);
     }
-    else
+    if (ivl_mask_any(anew))
     {
-        memcpy(w->trial.gap_m, w->trial.gap_after_m, sizeof w->trial.gap_m);
+        (void)world_gaps(group, &group->state, progress->t_s, anew, progress->gap_m);
     }
-    world_handle_touches(group, lane, w->trial.gap_m);
-    w->trial.starting = w->restart;
-    w->restart = false;
-    w->trial.n_try = 0;
-    propose(group, lane, w->trial.starting ? 0.0 : world_next_step(group, lane));
+    world_handle_touches(group, which);
+    progress->starting = (which & progress->restart) | (~which & progress->starting);
+    progress->restart &= ~which;
+    const ivl_wide_t dt = ivl_wide_select(progress->starting, ivl_wide(0.0), world_next_step(group));
+    progress->dt_s = ivl_wide_select(which, dt, progress->dt_s);
 }
 
-/// Looks at the step that was tried.
-/// @param[in] diverged  where it led to is no motion any more
-/// @return true if it stands; if not, another has been proposed
-static bool judge(ivl_sim_group_t *group, int lane, bool diverged)
+/// Looks at the steps that were tried.
+/// @param[in] moving    lanes in which one was
+/// @param[in] diverged  those in which it led to what is no motion any more
+/// @return those in which it stands; in the others another has been proposed
+static ivl_mask_t judge(ivl_sim_group_t *group, ivl_mask_t moving, ivl_mask_t diverged)
 {
-    ivl_sim_world_t *w = &group->world[lane];
-    if (world_handle_held(group, lane))
-    {
-        w->trial.n_try = 0;  // the forces have jumped: begin again from here
-        return false;
-    }
-    if (w->trial.starting || w->trial.n_try >= IVL_SIM_RETRIES_MAX)
-    {
-        return true;
-    }
-    const double most = world_longest_retry(group, lane);
+    ivl_sim_progress_t *progress = &group->progress;
+    // where the forces have jumped it begins again from here
+    const ivl_mask_t jumped = world_handle_held(group, moving);
+    const ivl_mask_t tested = moving & ~jumped & ~progress->starting & (progress->n_try < IVL_SIM_RETRIES_MAX);
     // where a motion that is none meets the surface says nothing, and to step there would take for ever
-    const bool   locate = w->trial.n_try < IVL_SIM_LOCATE_MAX && !diverged;
-    const double share = locate ? world_event_share(group, lane) : WORLD_NO_EVENT;
-    const double dt = (share < 1.0) ? share * w->trial.dt_s : w->trial.dt_s;
-    if (dt < w->trial.dt_s || most < w->trial.dt_s - IVL_SIM_TIME_SLACK_S)
-    {
-        w->trial.n_try++;
-        propose(group, lane, (dt < most) ? dt : most);
-        return false;
-    }
-    return true;
+    const ivl_mask_t locates = tested & (progress->n_try < IVL_SIM_LOCATE_MAX) & ~diverged;
+    const ivl_mask_t looks = locates | (moving & ~jumped & progress->starting);
+    const ivl_mask_t near = world_gaps(group, &group->next, progress->t_s + progress->dt_s, looks, progress->gap_after_m);
+    const ivl_wide_t tried = progress->dt_s, share = world_event_share(group, near & locates);
+    const ivl_wide_t dt = ivl_wide_select(share < 1.0, share * tried, tried), most = world_longest_retry(group);
+    const ivl_mask_t again = tested & ((dt < tried) | (most < tried - IVL_SIM_TIME_SLACK_S));
+    progress->dt_s = ivl_wide_select(again, ivl_wide_smaller(dt, most), tried);
+    progress->n_try = (progress->n_try - again) & again;
+    return moving & ~jumped & ~again;
+}
+
+// A body that turns faster than this, or is farther away, moves no more as anything does.
+static const double RATE_MOST_RADPS = 1.0e6, FAR_MOST_M = 1.0e6;
+
+/// Of each lane.
+static ivl_mask_t all_diverged(const ivl_sim_state_t *s)
+{
+    const ivl_w3_t   w = s->w_B_radps, p = s->p_WB_m;
+    const ivl_wide_t rate_radps = ivl_wide_abs(w.x) + ivl_wide_abs(w.y) + ivl_wide_abs(w.z);
+    const ivl_wide_t far_m = ivl_wide_abs(p.x) + ivl_wide_abs(p.y) + ivl_wide_abs(p.z);
+    return ~((rate_radps < RATE_MOST_RADPS) & (far_m < FAR_MOST_M));
 }
 
 bool ivl_sim_world_diverged(const ivl_sim_state_t *s, int lane)
 {
-    const double rate_radps = fabs(s->w_B_radps.x[lane]) + fabs(s->w_B_radps.y[lane]) + fabs(s->w_B_radps.z[lane]);
-    const double far_m = fabs(s->p_WB_m.x[lane]) + fabs(s->p_WB_m.y[lane]) + fabs(s->p_WB_m.z[lane]);
-    return !(rate_radps < 1.0e6 && far_m < 1.0e6);
+    const ivl_d3_t w = ivl_w3_lane(&s->w_B_radps, lane), p = ivl_w3_lane(&s->p_WB_m, lane);
+    return !(fabs(w.x) + fabs(w.y) + fabs(w.z) < RATE_MOST_RADPS && fabs(p.x) + fabs(p.y) + fabs(p.z) < FAR_MOST_M);
 }
 
-static void accept(ivl_sim_group_t *group, int lane, bool diverged)
+/// @param[in] moved  lanes whose step stands, and took time
+static void accept(ivl_sim_group_t *group, ivl_mask_t moved, ivl_mask_t diverged)
 {
-    ivl_sim_world_t *w = &group->world[lane];
-    if (w->trial.starting)
+    ivl_sim_progress_t *progress = &group->progress;
+    const ivl_mask_t    turned = moved & progress->powered;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
     {
-        world_gaps(w, &group->next, lane, w->t_s, w->trial.gap_after_m);
-        return;
+        group->rotor.speed_radps[i] = ivl_wide_select(turned, progress->rotor.speed_radps[i], group->rotor.speed_radps[i]);
     }
-    if (w->trial.powered)
-    {
-        w->rotor = w->trial.rotor;
-    }
-    w->t_s += w->trial.dt_s;
-    w->left_s -= w->trial.dt_s;
-    w->n_step++;
-    if (diverged)
-    {
-        w->left_s = 0.0;  // the tick ends here, and with it the landing
-    }
-    const double height = ivl_sim_surface_height_of(&w->model->surface, ivl_w3_lane(&group->next.p_WB_m, lane));
-    const double d = ivl_sim_world_surface_m(w, w->t_s) - height;
-    w->d_min_m = (d < w->d_min_m) ? d : w->d_min_m;
-    world_grow_step(w, &group->next, &group->rate, lane);
+    const ivl_wide_t left =
+        ivl_wide_select(diverged, ivl_wide(0.0), progress->left_s - progress->dt_s);  // the tick ends, and with it the landing
+    progress->t_s = ivl_wide_select(moved, progress->t_s + progress->dt_s, progress->t_s);
+    progress->left_s = ivl_wide_select(moved, left, progress->left_s);
+    progress->n_step -= moved;
+    const ivl_wide_t d = world_surface_m(group, progress->t_s) - ivl_sim_surface_heights_of(&group->model->surface, group->next.p_WB_m);
+    progress->d_min_m = ivl_wide_select(moved & (d < progress->d_min_m), d, progress->d_min_m);
+    world_grow_step(group, moved);
 }
 
-/// state = next and last = rate, in the lanes where the step stands.  Most stand, so the few others are put back, and then all are copied.
-static void commit(ivl_sim_group_t *group, const bool stands[IVL_SIM_LANES])
+/// to = from in the lanes that `which` names, for structs that are made of wide numbers only.
+IVL_SIM_INLINE void take(void *to, const void *from, size_t size, ivl_mask_t which)
 {
-    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+    ivl_wide_t       *t = to;
+    const ivl_wide_t *f = from;
+    for (size_t i = 0; i < size / sizeof *t; i++)
     {
-        if (!stands[lane])
-        {
-            ivl_sim_state_lane_copy(&group->next, &group->state, lane);
-            ivl_sim_rate_lane_copy(&group->rate, &group->last, lane);
-        }
+        t[i] = ivl_wide_select(which, f[i], t[i]);
     }
-    group->state = group->next;
-    group->last = group->rate;
 }
 
 bool ivl_sim_world_ready(const ivl_sim_group_t *group, int lane)
 {
-    return !(group->world[lane].left_s > IVL_SIM_TIME_SLACK_S);
+    return !(group->progress.left_s[lane] > IVL_SIM_TIME_SLACK_S);
 }
 
-/// True if a world has motion to do and may take one more evaluation for it.  This bounds every loop of steps: no tick takes
-/// more evaluations than it was given, whatever the vehicle and its state.
-static bool may_move(ivl_sim_group_t *group, int lane)
+static void give_up(ivl_sim_group_t *group, ivl_mask_t which)
 {
-    ivl_sim_world_t *w = &group->world[lane];
-    if (!group->active[lane] || ivl_sim_world_ready(group, lane))
+    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
-        return false;
+        if (which[lane])
+        {
+            group->world[lane].gave_up = true;
+            group->progress.left_s[lane] = 0.0;
+            group->progress.restart[lane] = -1;
+            group->progress.n_try[lane] = 0;
+        }
     }
-    if (w->evaluations_left == 0)
+}
+
+/// Worlds that have motion to do and may take one more evaluation for it.  This bounds every loop of steps: no tick takes
+/// more evaluations than it was given, whatever the vehicle and its state.
+static ivl_mask_t may_move(ivl_sim_group_t *group)
+{
+    ivl_sim_progress_t *progress = &group->progress;
+    const ivl_mask_t    due = progress->left_s > IVL_SIM_TIME_SLACK_S, spent = due & (progress->evaluations_left == 0);
+    if (ivl_mask_any(spent))
     {
-        w->gave_up = true;
-        w->left_s = 0.0;
-        w->restart = true;
-        w->trial.n_try = 0;
-        return false;
+        give_up(group, spent);
     }
-    w->evaluations_left--;
-    w->n_evaluation++;
-    return true;
+    const ivl_mask_t moving = due & ~spent;
+    progress->evaluations_left += moving;
+    progress->n_evaluation -= moving;
+    return moving;
 }
 
 void ivl_sim_group_step(ivl_sim_group_t *group)
 {
-    bool stands[IVL_SIM_LANES], moving[IVL_SIM_LANES];
-    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
-    {
-        moving[lane] = may_move(group, lane);
-        if (!moving[lane])
-        {
-            group->dt_s[lane] = 0.0;
-        }
-        else if (group->world[lane].trial.n_try == 0)
-        {
-            begin_step(group, lane);
-        }
-    }
-    ivl_sim_leapfrog(group->model, &group->contact, &group->load, &group->dt_s, &group->state, &group->last, &group->next, &group->rate);
-    for (int lane = 0; lane < IVL_SIM_LANES; lane++)
-    {
-        const bool diverged = moving[lane] && ivl_sim_world_diverged(&group->next, lane);
-        stands[lane] = moving[lane] && judge(group, lane, diverged);
-        if (stands[lane])
-        {
-            accept(group, lane, diverged);
-            group->world[lane].trial.n_try = 0;
-        }
-    }
-    commit(group, stands);
+    ivl_sim_progress_t *progress = &group->progress;
+    const ivl_mask_t    moving = may_move(group);
+    begin_step(group, moving & (progress->n_try == 0));
+    progress->dt_s = ivl_wide_select(moving, progress->dt_s, ivl_wide(0.0));
+    propose(group);
+    ivl_sim_leapfrog(group->model, &group->contact, &group->load, &progress->dt_s, &group->state, &group->last, &group->next, &group->rate);
+    const ivl_mask_t diverged = all_diverged(&group->next);
+    const ivl_mask_t stands = judge(group, moving, diverged);
+    accept(group, stands & ~progress->starting, diverged);
+    take(&group->state, &group->next, sizeof group->state, stands);
+    take(&group->last, &group->rate, sizeof group->last, stands);
 }

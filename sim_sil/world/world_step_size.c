@@ -162,24 +162,26 @@ static double slow_damping(const ivl_sim_model_t *model)
 }
 
 /// Longest step for a motion with the rate of damping g and the frequency w.                         [MODEL eq. 7.6]
-static double root_of(double g_per_s, double quarter_per_s2)
+IVL_SIM_INLINE ivl_wide_t root_of(ivl_wide_t g_per_s, ivl_wide_t quarter_per_s2)
 {
     const double limit = IVL_SIM_STABLE;
-    return 2.0 * limit / (g_per_s + sqrt(g_per_s * g_per_s + 4.0 * quarter_per_s2 * limit));
+    return 2.0 * limit / (g_per_s + ivl_wide_sqrt(g_per_s * g_per_s + 4.0 * quarter_per_s2 * limit));
 }
 
-double ivl_sim_step_longest(const ivl_sim_step_limits_t *step, const ivl_sim_pace_t *pace, double most_s)
+ivl_wide_t ivl_sim_step_longest(const ivl_sim_step_limits_t *step, const ivl_sim_pace_t *pace, ivl_wide_t most_s)
 {
-    if (ivl_sim_step_allowed(step, pace, 1.0, most_s))
+    const ivl_mask_t allowed = ivl_sim_step_allowed(step, pace, 1.0, most_s);
+    if (!ivl_mask_any(~allowed))
     {
         return most_s;
     }
-    const double quarter = pace->swing_norm * step->swing_quarter_per_s2, turn2 = pace->turn2_per_s2;
-    const double stretch = pace->stretch_norm / IVL_SIM_STRETCH;
-    const double rings = root_of(pace->swing_norm * step->swing_damping_per_s + step->damping_per_s, quarter);
-    const double drifts = sqrt(step->drift_per_s2 / (turn2 * (turn2 + 4.0 * quarter)));
-    const double stretched = step->longest_s / (stretch * stretch * stretch * stretch);
-    return ivl_sim_smaller(ivl_sim_smaller(rings, drifts), ivl_sim_smaller(stretched, most_s));
+    const ivl_wide_t quarter = pace->swing_norm * step->swing_quarter_per_s2, turn2 = pace->turn2_per_s2;
+    const ivl_wide_t stretch = pace->stretch_norm / IVL_SIM_STRETCH;
+    const ivl_wide_t rings = root_of(pace->swing_norm * step->swing_damping_per_s + step->damping_per_s, quarter);
+    const ivl_wide_t drifts = ivl_wide_sqrt(step->drift_per_s2 / (turn2 * (turn2 + 4.0 * quarter)));
+    const ivl_wide_t stretched = step->longest_s / (stretch * stretch * stretch * stretch);
+    const ivl_wide_t longest = ivl_wide_smaller(ivl_wide_smaller(rings, drifts), ivl_wide_smaller(stretched, most_s));
+    return ivl_wide_select(allowed, most_s, longest);
 }
 
 /// Of all steps that are chosen by these rules; RODS_TURN_MAX_PER_S and STRETCH_MAX are where belief in the motion ends.
@@ -189,8 +191,8 @@ static double shortest(const ivl_sim_model_t *model)
     const double            locked = 1.0 / (IVL_SIM_COS_SIDEWAYS_MIN * IVL_SIM_COS_SIDEWAYS_MIN);
     const double            turning = ivl_sim_smaller(raw->step_flight_s, raw->step_swing_s) / IVL_SIM_TURNS_MAX;
     const double            graded = ivl_sim_smaller(turning, ivl_sim_smaller(raw->step_touch_s, raw->step_plate_s)) * raw->step_scale_norm;
-    const ivl_sim_pace_t    wild = {locked, RODS_TURN_MAX_PER_S * RODS_TURN_MAX_PER_S, STRETCH_MAX};
-    return ivl_sim_step_longest(&model->step, &wild, graded);
+    const ivl_sim_pace_t    wild = {ivl_wide(locked), ivl_wide(RODS_TURN_MAX_PER_S * RODS_TURN_MAX_PER_S), ivl_wide(STRETCH_MAX)};
+    return ivl_sim_step_longest(&model->step, &wild, ivl_wide(graded))[0];
 }
 
 uint32_t ivl_sim_step_evaluations(const ivl_sim_step_limits_t *step, double span_s)
@@ -209,9 +211,10 @@ bool ivl_sim_step_derive(ivl_sim_model_t *model, char *error, size_t error_size)
     step->stuck_norm = ivl_sim_smaller(stuck_mobility(model) / mobility, 1.0);
     step->damping_per_s = slow_damping(model);
     step->drift_per_s2 = IVL_SIM_DRIFT * (4.0 / 3.0) * IVL_SIM_STABILISATION_PER_S * IVL_SIM_STABILISATION_PER_S;
-    step->longest_s = root_of(2.0 * IVL_SIM_STABILISATION_PER_S, 0.25 * IVL_SIM_STABILISATION_PER_S * IVL_SIM_STABILISATION_PER_S);
-    const ivl_sim_pace_t rest = {1.0, 0.0, 0.0};
-    const double         at_rest = ivl_sim_step_longest(step, &rest, step->longest_s);
+    const double sigma = IVL_SIM_STABILISATION_PER_S;
+    step->longest_s = root_of(ivl_wide(2.0 * sigma), ivl_wide(0.25 * sigma * sigma))[0];
+    const ivl_sim_pace_t rest = {ivl_wide(1.0), ivl_wide(0.0), ivl_wide(0.0)};
+    const double         at_rest = ivl_sim_step_longest(step, &rest, ivl_wide(step->longest_s))[0];
     // positive form: what is no number is refused
     if (!(mobility > 0.0 && at_rest >= REST_STEP_MIN_S))
     {

@@ -39,26 +39,26 @@ enum
 /// @param[out] error  one line, if the result is false: the legs are too stiff for any step
 bool ivl_sim_step_derive(ivl_sim_model_t *model, char *error, size_t error_size);
 
-/// Motion of the legs in one lane, as an evaluation found it: see ivl_sim_rate_t.
+/// Motion of the legs, as an evaluation found it: see ivl_sim_rate_t.
 typedef struct
 {
-    double swing_norm, turn2_per_s2, stretch_norm;
+    ivl_wide_t swing_norm, turn2_per_s2, stretch_norm;
 } ivl_sim_pace_t;
 
 /// True unless a step of dt is longer than the motion of the legs allows, by a factor of `more` at least.  Motion that is no
 /// number does not shorten a step.
-static inline bool ivl_sim_step_allowed(const ivl_sim_step_limits_t *step, const ivl_sim_pace_t *pace, double more, double dt_s)
+IVL_SIM_INLINE ivl_mask_t ivl_sim_step_allowed(const ivl_sim_step_limits_t *step, const ivl_sim_pace_t *pace, double more, ivl_wide_t dt_s)
 {
-    const double g = pace->swing_norm * step->swing_damping_per_s + step->damping_per_s;
-    const double quarter = pace->swing_norm * step->swing_quarter_per_s2, turn2 = pace->turn2_per_s2;
-    const double stretch2 = pace->stretch_norm * pace->stretch_norm * (1.0 / (IVL_SIM_STRETCH * IVL_SIM_STRETCH));
-    const bool   rings = dt_s * (g + dt_s * quarter) > more * IVL_SIM_STABLE;
-    const bool   drifts = dt_s * dt_s * turn2 * (turn2 + 4.0 * quarter) > more * more * step->drift_per_s2;
-    return !(rings || drifts || dt_s * stretch2 * stretch2 > more * step->longest_s);
+    const ivl_wide_t g = pace->swing_norm * step->swing_damping_per_s + step->damping_per_s;
+    const ivl_wide_t quarter = pace->swing_norm * step->swing_quarter_per_s2, turn2 = pace->turn2_per_s2;
+    const ivl_wide_t stretch2 = pace->stretch_norm * pace->stretch_norm * (1.0 / (IVL_SIM_STRETCH * IVL_SIM_STRETCH));
+    const ivl_mask_t rings = dt_s * (g + dt_s * quarter) > more * IVL_SIM_STABLE;
+    const ivl_mask_t drifts = dt_s * dt_s * turn2 * (turn2 + 4.0 * quarter) > more * more * step->drift_per_s2;
+    return ~(rings | drifts | (dt_s * stretch2 * stretch2 > more * step->longest_s));
 }
 
 /// Longest step, up to `most_s`, that may be chosen.
-double ivl_sim_step_longest(const ivl_sim_step_limits_t *step, const ivl_sim_pace_t *pace, double most_s);
+ivl_wide_t ivl_sim_step_longest(const ivl_sim_step_limits_t *step, const ivl_sim_pace_t *pace, ivl_wide_t most_s);
 
 /// Evaluations of the forces that a motion may take before it is given up.  Never 0.
 uint32_t ivl_sim_step_evaluations(const ivl_sim_step_limits_t *step, double span_s);

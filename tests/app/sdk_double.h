@@ -33,10 +33,12 @@ typedef struct
     bool         controller_runs;  ///< false: another controller is selected
     float        variance_m2;
     bool         has_variance;
-    float        range_up_mm;  ///< 0: no such sensor
+    char         certain_axis;  ///< 'X', 'Y' or 'Z': its variance is next to nothing; 0: of none
+    float        range_up_mm;   ///< 0: no such sensor
     unsigned int motor_power_set;
     unsigned int idle_thrust;  ///< powerDist.idleThrust
     bool         has_no_idle;  ///< there is no such parameter
+    bool         has_no_motor_power_set;
     setpoint_t   setpoint;
     sensorData_t sensors;
     state_t      state;
@@ -49,7 +51,7 @@ typedef struct
     control_t                      control;
     stabilizerStep_t               step;
     int                            n_pid_init, n_pid_null, n_pid;
-    stabilizerStep_t               last_pid_step;
+    stabilizerStep_t               last_pid_step, null_pid_step;
     int                            n_relax, n_go_to;
     int                            n_idle_told;
     int                            n_told;  ///< parameters that were changed by the app, and told to clients

@@ -73,6 +73,8 @@ static ivl_wire_policy_echo_t send_part(const ivl_wire_policy_t *packet)
     ivl_wire_policy_echo_t echo = {0};
     TEST_ASSERT_TRUE(ivl_wire_get_policy_echo(last_sent()->bytes, last_sent()->size, &echo));
     TEST_ASSERT_EQUAL_UINT32(packet->seq, echo.seq);
+    // only a policy of several parts lacks any
+    TEST_ASSERT_TRUE((packet->n > IVL_WIRE_THETAS) || (echo.missing == 0u));
     return echo;
 }
 
@@ -344,6 +346,7 @@ static void test_core_takes_over_and_gives_back_without_a_step(void)
     TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, HOVER_THRUST / 65535.0f, last);
     // and back: the stock controller starts anew, with all its loops at once
     const int n_null = sdk.n_pid_null;
+    sdk.null_pid_step = 77;
     ivl_app.command_in.value.request = IVL_REQUEST_IDLE;
     atomic_store(&ivl_app.command_in.full, true);
     for (int i = 0; i < 400; i++)
@@ -356,6 +359,7 @@ static void test_core_takes_over_and_gives_back_without_a_step(void)
         if (was_core && !is_core)
         {
             TEST_ASSERT_EQUAL_UINT32(0, sdk.last_pid_step);
+            TEST_ASSERT_EQUAL_UINT32(0, sdk.null_pid_step);
         }
         last = now;
     }
@@ -960,6 +964,187 @@ static void test_command_that_was_overtaken_is_not_obeyed_unless_it_stops(void)
     }
 }
 
+/// Moving up fast under a ceiling that is near: every condition of a flip holds but the time before it.
+static void test_one_packet_does_not_lead_from_idle_into_a_flip(void)
+{
+    start_in_flight();
+    sdk.state.position.z = 1.9f;
+    sdk.state.velocity.z = 2.5f;
+    const uint32_t n_trigger = ivl_app.state.diag.n_trigger;
+    heartbeat(IVL_REQUEST_APPROACH, 100);
+    TEST_ASSERT_EQUAL_INT(IVL_PHASE_IDLE, ivl_app.state.phase);
+    TEST_ASSERT_EQUAL_UINT32(n_trigger, ivl_app.state.diag.n_trigger);
+    // asked to hover first, it flips
+    heartbeat(IVL_REQUEST_HOVER, 20);
+    TEST_ASSERT_EQUAL_INT(IVL_PHASE_READY, ivl_app.state.phase);
+    heartbeat(IVL_REQUEST_APPROACH, 20);
+    TEST_ASSERT_EQUAL_UINT32(n_trigger + 1u, ivl_app.state.diag.n_trigger);
+}
+
+static void test_a_firmware_that_does_not_say_whether_motors_are_driven_past_the_controller_counts_as_if_they_were(void)
+{
+    start();
+    sdk.n_receive_left = 10;
+    app_task_once();
+    TEST_ASSERT_FALSE(atomic_load(&ivl_app.motors_bypassed));
+    sdk.has_no_motor_power_set = true;
+    app_task_start();
+    app_task_once();
+    TEST_ASSERT_TRUE(atomic_load(&ivl_app.motors_bypassed));
+}
+
+/// The least certain axis counts, whichever it is.
+static void test_the_position_is_as_uncertain_as_its_least_certain_axis(void)
+{
+    start();
+    sdk.n_receive_left = 10;
+    for (char axis = 'X'; axis <= 'Z'; axis++)
+    {
+        sdk.variance_m2 = 0.04f;
+        sdk.certain_axis = axis;
+        app_task_once();
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.2f, atomic_load(&ivl_app.p_sigma_m));
+    }
+    for (char axis = 'X'; axis <= 'Z'; axis++)
+    {
+        // one that is no number is seen
+        sdk.variance_m2 = NAN;
+        sdk.certain_axis = axis;
+        app_task_once();
+        TEST_ASSERT_TRUE(isnan(atomic_load(&ivl_app.p_sigma_m)));
+    }
+}
+
+static void test_a_configuration_stays_when_the_controller_is_selected_again(void)
+{
+    start();
+    sdk_double_write_float("host_s_max", 1.5f);
+    TEST_ASSERT_EQUAL_INT(IVL_WIRE_OK, commit(1).status);
+    controllerOutOfTreeInit();
+    TEST_ASSERT_FLOAT_WITHIN(0.0f, 1.5f, ivl_app.cfg.host_s_max);
+}
+
+/// Who had the motors when another controller was selected has them when the app's is selected again.
+static void test_a_controller_that_is_selected_again_fades_from_whoever_had_the_motors(void)
+{
+    start_in_flight();
+    controllerOutOfTreeInit();
+    TEST_ASSERT_EQUAL_INT(APP_OWNER_STOCK, ivl_app.owner);
+    start_ready();
+    controllerOutOfTreeInit();
+    TEST_ASSERT_EQUAL_INT(APP_OWNER_CORE, ivl_app.owner);
+}
+
+/// In flight, too, what is told first is what is wrong with it.
+static void test_the_first_row_of_a_configuration_is_refused_as_any_other(void)
+{
+    start_ready();
+    sdk_double_write_float(ivl_cfg_name(0), NAN);
+    const ivl_wire_config_echo_t echo = commit(2);
+    TEST_ASSERT_EQUAL_INT(IVL_ERR_RANGE, echo.status);
+    TEST_ASSERT_EQUAL_UINT8(0, echo.bad);
+}
+
+/// The stock controller had 5 % more thrust: what is left of that is added in an abort, too.
+static void test_thrust_fades_on_when_an_abort_follows_at_once(void)
+{
+    start_ready();
+    TEST_ASSERT_EQUAL_UINT8(IVL_PHASE_ABORTED, send_command(IVL_REQUEST_ABORT).phase);
+    sdk_double_run(4);
+    assert_phase(IVL_PHASE_ABORTED);
+    TEST_ASSERT_TRUE(fabsf(sdk.control.normalizedForces[0] - app_norm_of_N(ivl_app.out.thrust_N[0])) > 1.0e-3f);
+}
+
+static void test_the_attitude_is_the_estimators_while_the_vehicle_is_idle(void)
+{
+    start();
+    sdk_double_run(10);
+    sdk.state.attitudeQuaternion.x = 0.1f;
+    sdk.state.attitudeQuaternion.y = -0.2f;
+    sdk.state.attitudeQuaternion.z = 0.3f;
+    sdk.state.attitudeQuaternion.w = sqrtf(1.0f - 0.14f);
+    sdk_double_run(4);
+    assert_phase(IVL_PHASE_IDLE);
+    const ivl_quat_t expected = app_q_WB(&sdk.state), q_WB = ivl_app.senses.attitude.q_WB;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 1.0f, fabsf(q_WB.x * expected.x + q_WB.y * expected.y + q_WB.z * expected.z + q_WB.w * expected.w));
+}
+
+/// Each commit has the whole time that a controller may take, whatever became of the one before.
+static void test_the_time_of_a_commit_begins_with_it(void)
+{
+    start();
+    sdk_double_write_u32("commit", 1);
+    sdk_double_run(4);
+    ivl_app.n_config_polls = 7;
+    app_packets_poll(&ivl_app);
+    TEST_ASSERT_EQUAL_INT(0, ivl_app.n_config_polls);
+    sdk.controller_runs = false;
+    for (uint32_t seq = 2; seq <= 3u; seq++)
+    {
+        int n = 0;
+        sdk.n_sent = 0;
+        for (sdk_double_write_u32("commit", seq); (sdk.n_sent == 0) && (n < 100); n++)
+        {
+            app_packets_poll(&ivl_app);
+        }
+        TEST_ASSERT_EQUAL_INT(21, n);
+        TEST_ASSERT_EQUAL_INT(0, ivl_app.n_config_polls);
+    }
+}
+
+/// A set-point of no height and any thrust, however little, is somebody who wants to fly.
+static void test_the_least_thrust_of_a_setpoint_is_no_rest(void)
+{
+    start_in_flight();
+    sdk.setpoint.mode.z = modeDisable;
+    const struct
+    {
+        float thrust;
+        bool  is_idle;
+    } ROWS[] = {{0.0f, true}, {1.0e-6f, false}, {0.5f, false}, {1.0f, false}, {65535.0f, false}};
+    for (size_t i = 0; i < sizeof ROWS / sizeof ROWS[0]; i++)
+    {
+        sdk.setpoint.thrust = ROWS[i].thrust;
+        sdk_double_run(4);
+        TEST_ASSERT_EQUAL_INT(ROWS[i].is_idle, ivl_app.in.vitals.stock_idle);
+    }
+    sdk.setpoint.thrust = 0.0f;
+    sdk.setpoint.mode.z = modeAbs;
+    sdk_double_run(4);
+    TEST_ASSERT_FALSE(ivl_app.in.vitals.stock_idle);
+}
+
+static void test_a_packet_of_any_length_is_counted_if_it_is_none(void)
+{
+    start();
+    sdk.n_receive_left = 10;
+    for (size_t size = 1; size <= 5u; size++)
+    {
+        const uint32_t before = ivl_app.n_bad_packet;
+        memset(sdk.incoming.bytes, 0x7f, sizeof sdk.incoming.bytes);
+        sdk.incoming.size = size;
+        app_task_once();
+        TEST_ASSERT_EQUAL_UINT32(before + 1u, ivl_app.n_bad_packet);
+    }
+    const uint32_t before = ivl_app.n_bad_packet;
+    app_task_once();
+    TEST_ASSERT_EQUAL_UINT32(before, ivl_app.n_bad_packet);
+}
+
+/// The stabilizer takes what waits in its next call: a millisecond, and the answer goes out.
+static void test_the_task_comes_back_after_a_millisecond_when_something_waits(void)
+{
+    start();
+    sdk.n_receive_left = 10;
+    const ivl_wire_policy_t packet = constant_packet(8, 5.0f, 0.006f);
+    sdk.incoming.size = ivl_wire_put_policy(sdk.incoming.bytes, &packet);
+    app_task_once();
+    TEST_ASSERT_TRUE(app_packets_waiting(&ivl_app));
+    const uint64_t before_us = sdk.now_us;
+    app_task_once();
+    TEST_ASSERT_EQUAL_UINT64(before_us + 1000u, sdk.now_us);
+}
+
 static void test_packets_arrive_through_the_task(void)
 {
     start();
@@ -1094,6 +1279,18 @@ int main(void)
     RUN_TEST(test_packets_are_answered_and_not_kept_when_another_controller_is_selected);
     RUN_TEST(test_command_that_makes_no_sense_is_refused_and_is_no_heartbeat);
     RUN_TEST(test_command_that_was_overtaken_is_not_obeyed_unless_it_stops);
+    RUN_TEST(test_one_packet_does_not_lead_from_idle_into_a_flip);
+    RUN_TEST(test_a_firmware_that_does_not_say_whether_motors_are_driven_past_the_controller_counts_as_if_they_were);
+    RUN_TEST(test_the_position_is_as_uncertain_as_its_least_certain_axis);
+    RUN_TEST(test_a_configuration_stays_when_the_controller_is_selected_again);
+    RUN_TEST(test_the_first_row_of_a_configuration_is_refused_as_any_other);
+    RUN_TEST(test_a_controller_that_is_selected_again_fades_from_whoever_had_the_motors);
+    RUN_TEST(test_thrust_fades_on_when_an_abort_follows_at_once);
+    RUN_TEST(test_the_attitude_is_the_estimators_while_the_vehicle_is_idle);
+    RUN_TEST(test_the_time_of_a_commit_begins_with_it);
+    RUN_TEST(test_the_least_thrust_of_a_setpoint_is_no_rest);
+    RUN_TEST(test_a_packet_of_any_length_is_counted_if_it_is_none);
+    RUN_TEST(test_the_task_comes_back_after_a_millisecond_when_something_waits);
     RUN_TEST(test_packets_arrive_through_the_task);
     RUN_TEST(test_noise_on_the_channel_starts_no_motor_and_breaks_nothing);
     return UNITY_END();

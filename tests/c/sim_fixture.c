@@ -143,18 +143,34 @@ void nose_up(double angle, double q[4])
     q[3] = cos(0.5 * angle);
 }
 
+void stop_rotors(ivl_sim_group_t *group, int lane)
+{
+    const double still[IVL_SIM_MOTORS] = {0.0, 0.0, 0.0, 0.0};
+    ivl_sim_rotor_set(&group->rotor, lane, still);
+}
+
+void command_rotors(ivl_sim_group_t *group, const float thrust_N[IVL_SIM_MOTORS])
+{
+    ivl_mask_t which = {0};
+    ivl_wide_t thrust[IVL_SIM_MOTORS] = {{0.0}};
+    which[0] = -1;
+    for (int i = 0; i < IVL_SIM_MOTORS; i++)
+    {
+        thrust[i][0] = (double)thrust_N[i];
+    }
+    ivl_sim_rotor_command(group->model, &group->rotor, &which, thrust);
+}
+
 void place_alone(const ivl_sim_model_t *model, ivl_sim_group_t *group, const ivl_sim_kin_t *kin, const ivl_sim_foot_t held[IVL_SIM_LEGS])
 {
     const ivl_sim_rng_t rng = {1, 2};
-    const float         off[4] = {0.0f, 0.0f, 0.0f, 0.0f};
     ivl_sim_group_init(model, group);
     ivl_sim_world_start(group, 0, &rng, kin->p_WB_m, kin->v_WB_mps);
     ivl_sim_world_t *world = &group->world[0];
     memcpy(world->foot, held, sizeof world->foot);
     ivl_sim_contact_set(model, &group->contact, 0, held);
     ivl_sim_world_place(group, 0, kin);
-    ivl_sim_rotor_command(model, &world->rotor, off);
-    memset(world->rotor.speed_radps, 0, sizeof world->rotor.speed_radps);
+    stop_rotors(group, 0);
 }
 
 static bool all_ready(const ivl_sim_group_t *group)
@@ -175,8 +191,8 @@ void advance(ivl_sim_group_t *group, double dt_s)
     {
         if (group->active[lane])
         {
-            group->world[lane].left_s = dt_s;
-            group->world[lane].evaluations_left = ivl_sim_step_evaluations(&group->model->step, dt_s);
+            group->progress.left_s[lane] = dt_s;
+            group->progress.evaluations_left[lane] = ivl_sim_step_evaluations(&group->model->step, dt_s);
         }
     }
     while (!all_ready(group))
@@ -228,5 +244,5 @@ double energy_at_rest(const ivl_sim_model_t *model, const ivl_sim_kin_t *kin)
 double total_energy(const ivl_sim_group_t *group)
 {
     const ivl_sim_kin_t kin = ivl_sim_world_kin(group, 0);
-    return ivl_sim_energy(group->model, &kin, ivl_sim_world_surface_m(&group->world[0], group->world[0].t_s));
+    return ivl_sim_energy(group->model, &kin, ivl_sim_world_surface_m(group, 0));
 }

@@ -41,6 +41,12 @@ void nose_up(double angle, double q[4]);
 
 /// One vehicle in lane 0 of an otherwise empty group, motors at rest, no flight core in the loop.
 /// @param[in] held  feet that hold on from the start, where they are
+/// Thrust commands of the vehicle in lane 0.
+void command_rotors(ivl_sim_group_t *group, const float thrust_N[IVL_SIM_MOTORS]);
+
+/// Rotors that stand still, and are told to.
+void stop_rotors(ivl_sim_group_t *group, int lane);
+
 void place_alone(const ivl_sim_model_t *model, ivl_sim_group_t *group, const ivl_sim_kin_t *kin, const ivl_sim_foot_t held[IVL_SIM_LEGS]);
 
 /// Motion alone, for dt, with the rotor commands as they are; of all active worlds.  A world that takes more evaluations than

@@ -456,6 +456,37 @@ static void test_a_landing_may_be_asked_for_on_the_floor(void)
     TEST_ASSERT_EQUAL_MEMORY(&expected, &outcome, sizeof outcome);
 }
 
+/// A vehicle that is not put on a path is protected as a real one is.
+static void test_an_approach_as_flown_that_is_asked_for_on_the_floor_waits_for_ready(void)
+{
+    ivl_sim_model_t model;
+    open_noisy(&model);
+    run_ms(200);
+    (void)send_policy(7, 0.0f, 0.008f);
+    const double before = read_log("sil", "episode");
+    TEST_ASSERT_EQUAL_UINT8(IVL_PHASE_IDLE, send_command(IVL_REQUEST_APPROACH, 0.0f, 0.0f, 1.0f, 2.5f, 1.5f).phase);
+    run_ms(100);
+    assert_phase(IVL_PHASE_IDLE);
+    TEST_ASSERT_EQUAL_INT((int)before, (int)read_log("sil", "episode"));
+    TEST_ASSERT_EQUAL_INT(1, (int)read_log("sil", "grounded"));
+}
+
+/// The same policy, in force still, asks for 7 /s; the landing before it has flipped at 5.
+static void test_a_landing_that_flips_at_once_leaves_no_such_policy_behind(void)
+{
+    ivl_sim_model_t model;
+    open_noisy(&model);
+    const ivl_sim_spec_t spec = spec_of(2.5, 90.0, 7.0, 8.0, 0.5, 1, 0, IVL_SIM_START_AT_TRIGGER);
+    TEST_ASSERT_EQUAL_INT(1, fly(&spec, 1).triggered[0]);
+    write_u8("sil", "start", 255);
+    write_u8("sil", "reset", 1);
+    (void)send_command(IVL_REQUEST_HOVER, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f);
+    wait_for("ivl", "phase", (double)IVL_PHASE_READY);
+    (void)send_command(IVL_REQUEST_APPROACH, 0.0f, 0.0f, 1.0f, 1.0f, 1.5f);
+    run_ms(100);
+    assert_phase(IVL_PHASE_APPROACH);
+}
+
 static void test_numbers_of_a_start_are_kept_within_their_ranges(void)
 {
     ivl_sim_model_t model;
@@ -499,6 +530,8 @@ int main(void)
     RUN_TEST(test_the_flight_recorder_holds_the_flip_of_the_landing_in_vehicle_time);
     RUN_TEST(test_the_recording_of_a_landing_begins_at_its_start);
     RUN_TEST(test_a_landing_may_be_asked_for_on_the_floor);
+    RUN_TEST(test_an_approach_as_flown_that_is_asked_for_on_the_floor_waits_for_ready);
+    RUN_TEST(test_a_landing_that_flips_at_once_leaves_no_such_policy_behind);
     RUN_TEST(test_numbers_of_a_start_are_kept_within_their_ranges);
     return UNITY_END();
 }

@@ -157,7 +157,9 @@ static void tick(const ivl_in_t *in, double tick_hz)
     ivl_sim_model_t model = fixture_model(&params);
     model.core = (ivl_sim_core_t){.open = open_port, .close = close_port, .step = look};
     model.tick_s = 1.0 / tick_hz;
-    ivl_sim_autopilot_step(&model, NULL, 0, in, &autopilot, &firmware, &out);
+    ivl_reference_t ref;
+    TEST_ASSERT_FALSE(ivl_sim_autopilot_decide(&model, NULL, 0, in, &autopilot, &firmware, &out, &ref));
+    ivl_sim_autopilot_drive(&model, &out);
 }
 
 static void test_the_core_sees_the_command_and_a_position_dated_by_its_last_change(void)

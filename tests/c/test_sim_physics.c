@@ -128,7 +128,7 @@ static void test_yaw_torque_turns_the_body_against_the_rotors(void)
     const double legs = 4.0 * (params.leg_mass_kg * 0.04 * 0.04);  // about: rods from 24 to 62 mm off the axis
     ivl_sim_group_init(&model, &group);
     ivl_sim_world_start(&group, 0, &rng, p, v);
-    ivl_sim_rotor_command(&model, &group.world[0].rotor, command);
+    command_rotors(&group, command);
     advance_ticks(50);
     const double expected = -4.0 * 0.01 * 0.00612 / (params.body_inertia_zz_kgm2 + legs) * 0.1;
     TEST_ASSERT_DOUBLE_WITHIN(0.25 * fabs(expected), expected, ivl_sim_world_kin(&group, 0).w_B_radps[2]);
@@ -202,7 +202,7 @@ static void test_a_leg_rings_with_its_frequency_and_damping(void)
         advance(&group, 2.0e-5);
         const ivl_sim_kin_t now = ivl_sim_world_kin(&group, 0);
         const ivl_d3_t      hip = ivl_d3_add(ivl_d3_load(now.p_WB_m), model.leg.hip_B_m[0]);
-        watch(&c, group.world[0].t_s, ivl_d3_dot(ivl_d3_sub(ivl_d3_load(now.p_foot_W_m[0]), hip), model.leg.sideways_B[0]) / L);
+        watch(&c, group.progress.t_s[0], ivl_d3_dot(ivl_d3_sub(ivl_d3_load(now.p_foot_W_m[0]), hip), model.leg.sideways_B[0]) / L);
     }
     const double zeta = model.leg_damping_ratio, w = model.leg_frequency_radps;
     TEST_ASSERT_TRUE(c.n > 5 && fall > 0.0);
@@ -295,7 +295,7 @@ static void check_pendulum(const ivl_sim_foot_t foot[4], ivl_d3_t e, double foot
         advance(&group, 0.0005);
         const ivl_sim_kin_t now = ivl_sim_world_kin(&group, 0);
         const ivl_rot_t     R = ivl_rot_from_quat(now.q_WB);
-        watch(&c, group.world[0].t_s, ivl_d3_dot(ivl_rot_apply(&R, arm), side) / l);
+        watch(&c, group.progress.t_s[0], ivl_d3_dot(ivl_rot_apply(&R, arm), side) / l);
     }
     const double period = 2.0 * IVL_SIM_PI * sqrt(rigid.moment / (rigid.mass * g * l)) * (1.0 + tilt * tilt / 16.0);
     TEST_ASSERT_GREATER_THAN(4, c.n);

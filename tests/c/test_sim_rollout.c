@@ -90,15 +90,15 @@ static void test_a_landing_has_the_same_bits_alone_among_others_in_another_lane_
     for (int k = 0; k < 5; k++)
     {
         memset(batch, 0xaa, sizeof batch);
-        TEST_ASSERT_EQUAL(0, ivl_sil_rollouts(&model, spec, N_BATCH, threads[k], batch));
+        TEST_ASSERT_EQUAL(0, ivl_sil_rollouts(&model, spec, N_BATCH, threads[k], batch, NULL));
         TEST_ASSERT_EQUAL_MEMORY(alone, batch, sizeof alone);
-        TEST_ASSERT_EQUAL(0, ivl_sil_rollouts(&model, reversed, N_BATCH, threads[k], batch));
+        TEST_ASSERT_EQUAL(0, ivl_sil_rollouts(&model, reversed, N_BATCH, threads[k], batch, NULL));
         for (int i = 0; i < N_BATCH; i++)
         {
             TEST_ASSERT_EQUAL_MEMORY(&alone[i], &batch[N_BATCH - 1 - i], sizeof alone[i]);
         }
     }
-    TEST_ASSERT_EQUAL(0, ivl_sil_rollouts(&model, spec, 0, 4, batch));  // none
+    TEST_ASSERT_EQUAL(0, ivl_sil_rollouts(&model, spec, 0, 4, batch, NULL));  // none
 }
 
 static void test_noise_differs_between_streams_and_seeds_and_only_there(void)
@@ -205,7 +205,7 @@ static void check_missed(const ivl_sim_model_t *model, const ivl_sim_spec_t *spe
     w->in.cmd = (ivl_command_t){.request = IVL_REQUEST_APPROACH, .speed_mps = (float)V, .angle_rad = (float)angle};
     const ivl_policy_t policy = ivl_sim_policy(spec->form[0], spec->theta, false);
     TEST_ASSERT_EQUAL(IVL_OK, ivl_policy_commit(&model->firmware, &w->firmware, &policy));
-    while (w->t_s < o.t_trigger_s[0] + model->raw.end_missed_time_s)
+    while (group.progress.t_s[0] < o.t_trigger_s[0] + model->raw.end_missed_time_s)
     {
         ivl_sim_world_tick(&group, 0);
         while (!ivl_sim_world_ready(&group, 0))
@@ -264,7 +264,7 @@ static void test_a_spec_that_is_no_number_or_out_of_range_is_refused_and_disturb
     spec[n++].start[0] = -1;
     const ivl_sim_outcome_t expected = fly(&model, &good);
     TEST_ASSERT_GREATER_THAN(2, expected.n_legs[0]);
-    TEST_ASSERT_EQUAL(0, ivl_sil_rollouts(&model, spec, (size_t)n, 1, outcome));
+    TEST_ASSERT_EQUAL(0, ivl_sil_rollouts(&model, spec, (size_t)n, 1, outcome, NULL));
     for (int i = 0; i < n; i++)
     {
         if (i < 50 && i % 2 == 1)

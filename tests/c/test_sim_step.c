@@ -131,8 +131,8 @@ static void test_the_shipped_legs_keep_their_steps_of_two_milliseconds(void)
     const ivl_sim_params_t params = fixture_params();
     const ivl_sim_model_t  model = fixture_model(&params);
     TEST_ASSERT_TRUE(criterion(&model, 0.002) < IVL_SIM_STABLE - 0.1);
-    const ivl_sim_pace_t rest = {1.0, 0.0, 0.0};
-    TEST_ASSERT_EQUAL_DOUBLE(0.002, ivl_sim_step_longest(&model.step, &rest, 0.002));
+    const ivl_sim_pace_t rest = {ivl_wide(1.0), ivl_wide(0.0), ivl_wide(0.0)};
+    TEST_ASSERT_EQUAL_DOUBLE(0.002, ivl_sim_step_longest(&model.step, &rest, ivl_wide(0.002))[0]);
     TEST_ASSERT_TRUE(model.step.longest_s > 0.002);
 }
 
@@ -143,12 +143,18 @@ static void test_the_longest_step_is_just_allowed(void)
     {
         const ivl_sim_params_t params = draw_legs(&draws);
         const ivl_sim_model_t  model = fixture_model(&params);
-        const ivl_sim_pace_t   pace = {draw(&draws, 0.0, (i % 2 == 0) ? 2.0 : 400.0), draw(&draws, 0.0, (i % 3 == 0) ? 1.0e6 : 1.0e3),
-                                       draw(&draws, 0.0, (i % 5 == 0) ? 0.4 : 0.1)};
-        const double           dt = ivl_sim_step_longest(&model.step, &pace, 0.002);
-        TEST_ASSERT_TRUE(dt > 0.0 && dt <= 0.002);
-        TEST_ASSERT_TRUE(ivl_sim_step_allowed(&model.step, &pace, 1.0 + 1.0e-9, dt));
-        TEST_ASSERT_TRUE(!(dt < 0.002) || !ivl_sim_step_allowed(&model.step, &pace, 1.0, 1.001 * dt));
+        ivl_sim_pace_t         pace;
+        // another motion in each lane
+        for (int lane = 0; lane < IVL_SIM_LANES; lane++)
+        {
+            pace.swing_norm[lane] = draw(&draws, 0.0, (i % 2 == 0) ? 2.0 : 400.0);
+            pace.turn2_per_s2[lane] = draw(&draws, 0.0, (i % 3 == 0) ? 1.0e6 : 1.0e3);
+            pace.stretch_norm[lane] = draw(&draws, 0.0, (i % 5 == 0) ? 0.4 : 0.1);
+        }
+        const ivl_wide_t dt = ivl_sim_step_longest(&model.step, &pace, ivl_wide(0.002));
+        TEST_ASSERT_FALSE(ivl_mask_any(~((dt > 0.0) & (dt <= 0.002))));
+        TEST_ASSERT_FALSE(ivl_mask_any(~ivl_sim_step_allowed(&model.step, &pace, 1.0 + 1.0e-9, dt)));
+        TEST_ASSERT_FALSE(ivl_mask_any((dt < 0.002) & ivl_sim_step_allowed(&model.step, &pace, 1.0, 1.001 * dt)));
     }
 }
 
@@ -273,7 +279,8 @@ static void test_steps_of_four_milliseconds_after_a_contact_are_cut_to_what_the_
     turn_kin(&model, inverted, &kin);
     place_alone(&model, &group, &kin, ALL_STUCK);
     group.world[0].impact.happened = true;
-    group.world[0].graded_s = group.world[0].step_s = 0.004;
+    ivl_sim_world_note_contact(&group, 0);
+    group.progress.graded_s[0] = group.progress.step_s[0] = 0.004;
     double worst = 0.0;
     for (int i = 0; i < 60; i++)
     {
@@ -281,7 +288,7 @@ static void test_steps_of_four_milliseconds_after_a_contact_are_cut_to_what_the_
         kin = ivl_sim_world_kin(&group, 0);
         worst = fmax(worst, rod_error(&model, &kin));
     }
-    TEST_ASSERT_TRUE(group.world[0].step_s < 0.003 && group.world[0].step_s > 0.002);
+    TEST_ASSERT_TRUE(group.progress.step_s[0] < 0.003 && group.progress.step_s[0] > 0.002);
     TEST_ASSERT_TRUE(worst < 1.0e-4);
 }
 
@@ -349,10 +356,10 @@ static void test_motion_from_any_state_at_all_takes_no_more_evaluations_than_it_
         place_alone(&model, &group, &kin, (i % 4 == 3) ? ALL_STUCK : FREE);
         for (int k = 0; k < 3; k++)
         {
-            const uint32_t before = group.world[0].n_evaluation;
+            const int64_t before = group.progress.n_evaluation[0];
             advance(&group, model.tick_s);
             TEST_ASSERT_TRUE(ivl_sim_world_ready(&group, 0));
-            TEST_ASSERT_TRUE(group.world[0].n_evaluation - before <= ivl_sim_step_evaluations(&model.step, model.tick_s));
+            TEST_ASSERT_TRUE(group.progress.n_evaluation[0] - before <= ivl_sim_step_evaluations(&model.step, model.tick_s));
         }
         gave_up += group.world[0].gave_up ? 1 : 0;
     }
@@ -372,7 +379,7 @@ static void test_a_world_that_gave_up_says_so_until_it_is_placed_anew(void)
     advance(&group, 0.008);
     TEST_ASSERT_TRUE(group.world[0].gave_up);
     TEST_ASSERT_TRUE(ivl_sim_world_ready(&group, 0));
-    TEST_ASSERT_EQUAL_UINT32(6, group.world[0].n_evaluation);
+    TEST_ASSERT_EQUAL_INT64(6, group.progress.n_evaluation[0]);
     ivl_sim_world_place(&group, 0, &kin);
     TEST_ASSERT_FALSE(group.world[0].gave_up);
     advance(&group, 0.004);

@@ -349,7 +349,7 @@ static void test_a_plate_that_touches_is_noted_once_and_pushed_out(void)
     TEST_ASSERT_DOUBLE_WITHIN(2.0e-6, 0.0135, params.world_ceiling_height_m - w->impact.kin.p_WB_m[2]);
     kin = ivl_sim_world_kin(&group, 0);
     TEST_ASSERT_TRUE(kin.v_WB_mps[2] < -0.1);
-    TEST_ASSERT_TRUE(w->d_min_m < 0.0135 && w->d_min_m > 0.008);
+    TEST_ASSERT_TRUE(group.progress.d_min_m[0] < 0.0135 && group.progress.d_min_m[0] > 0.008);
 }
 
 // ---- coming off ------------------------------------------------------------------------------------------------------------
@@ -389,7 +389,7 @@ static void test_a_foot_comes_off_at_the_stated_pull_and_not_before(void)
     const double reached = largest_pull(&model, 0.15, limit, &unused);
     TEST_ASSERT_NOT_EQUAL(IVL_SIM_FOOT_STUCK, group.world[0].foot[0]);
     TEST_ASSERT_TRUE(reached <= limit);
-    TEST_ASSERT_DOUBLE_WITHIN(3.0e-4, crosses, group.world[0].t_s);
+    TEST_ASSERT_DOUBLE_WITHIN(3.0e-4, crosses, group.progress.t_s[0]);
 
     params.leg_adhesion_N = 1.01 * most;
     model = fixture_model(&params);
@@ -433,7 +433,7 @@ static void test_a_foot_that_came_off_can_stick_again(void)
     }
     ivl_sim_world_place(&group, 0, &kin);
     advance_ticks(0.04);
-    TEST_ASSERT_TRUE(group.world[0].t_touch_s[0] > 0.04);
+    TEST_ASSERT_TRUE(group.touch.t_touch_s[0][0] > 0.04);
 }
 
 // ---- stick delay -----------------------------------------------------------------------------------------------------------
@@ -454,7 +454,7 @@ static void test_a_foot_slides_first_and_sticks_after_the_delay_while_it_presses
         const ivl_sim_kin_t    kin = ivl_sim_world_kin(&group, 0);
         if (touched < 0.0 && w->foot[0] == IVL_SIM_FOOT_SLIDING)
         {
-            touched = w->t_touch_s[0];
+            touched = group.touch.t_touch_s[0][0];
             x_touch = kin.p_foot_W_m[0][0];
         }
         if (w->foot[0] == IVL_SIM_FOOT_SLIDING)
@@ -463,7 +463,7 @@ static void test_a_foot_slides_first_and_sticks_after_the_delay_while_it_presses
         }
         if (stuck < 0.0 && w->foot[0] == IVL_SIM_FOOT_STUCK)
         {
-            stuck = w->t_s;
+            stuck = group.progress.t_s[0];
             x_stuck = kin.p_foot_W_m[0][0];
         }
     }
@@ -526,7 +526,7 @@ static void test_d_min_is_the_smallest_distance_of_the_origin(void)
         advance(&group, 2.0e-4);
         least = fmin(least, params.world_ceiling_height_m - ivl_sim_world_kin(&group, 0).p_WB_m[2]);
     }
-    TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, least, group.world[0].d_min_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-6, least, group.progress.d_min_m[0]);
 }
 
 static void test_a_world_has_the_same_bits_in_any_lane_and_any_company(void)
@@ -544,15 +544,13 @@ static void test_a_world_has_the_same_bits_in_any_lane_and_any_company(void)
         advance_ticks(0.1);
         alone[i] = ivl_sim_world_kin(&group, 0);
     }
-    const float off[4] = {0.0f, 0.0f, 0.0f, 0.0f};
     ivl_sim_group_init(&model, &group);
     for (int i = 0; i < IVL_SIM_LANES; i++)
     {
         const int lane = IVL_SIM_LANES - 1 - i;
         ivl_sim_world_start(&group, lane, &rng, start[i].p_WB_m, start[i].v_WB_mps);
         ivl_sim_world_place(&group, lane, &start[i]);
-        ivl_sim_rotor_command(&model, &group.world[lane].rotor, off);
-        memset(group.world[lane].rotor.speed_radps, 0, sizeof group.world[lane].rotor.speed_radps);
+        stop_rotors(&group, lane);
     }
     advance_ticks(0.1);
     for (int i = 0; i < IVL_SIM_LANES; i++)

@@ -20,13 +20,13 @@
 #include "app_channel.h"
 #include "app_ivl.h"
 #include "controller.h"
+#include "player.h"
 #include "policy_fixture.h"
 #include "sdk_double.h"
 #include "unity.h"
 
 enum
 {
-    EVENTS_MAX = 60,
     HEARTBEAT_MS = 50,
     ANSWER_MS_MAX = 30  // of a packet that waits for one before it, and of its own
 };
@@ -61,17 +61,6 @@ typedef enum
 static const char *const NAMES[EVENTS] = {"wait", "policy", "no-go",  "broken policy", "command", "write", "commit",  "motion", "place",
                                           "turn", "touch",  "vitals", "stock",         "switch",  "noise", "reading", "traitor"};
 
-typedef struct
-{
-    uint8_t kind, a, b;
-} event_t;
-
-typedef struct
-{
-    event_t event[EVENTS_MAX];
-    int     n;
-} sequence_t;
-
 // ---- the model
 
 typedef struct
@@ -89,8 +78,9 @@ typedef struct
     bool        landed;    ///< a flip was begun: motors are off but in it
     float       rest_ms;   ///< upright, at rest, nobody wants to fly
     uint32_t    n_trigger, policy_crc, policy_seq, cfg_crc;
-    uint32_t    n_step;   ///< of the stabilizer that was looked at last
-    int         stop_ms;  ///< since a request to stop has left the host; -1: none is under way
+    uint32_t    n_step;    ///< of the stabilizer that was looked at last
+    bool        is_cycle;  ///< READY was seen since IDLE
+    int         stop_ms;   ///< since a request to stop has left the host; -1: none is under way
     uint8_t     stop;
 } model_t;
 
@@ -111,14 +101,6 @@ static void must(bool holds, const char *what)
     {
         breaks(what);
     }
-}
-
-static uint32_t next_random(uint32_t *state)
-{
-    *state ^= *state << 13;
-    *state ^= *state >> 17;
-    *state ^= *state << 5;
-    return *state;
 }
 
 static bool motors_turn(void)
@@ -151,6 +133,7 @@ static void check_flip(void)
     must(state->has_policy, "a flip without a policy");
     must(model.wanted == IVL_REQUEST_APPROACH, "a flip that nobody has asked for");
     must(state->policy.n == 2u, "a flip of a policy that expects no landing");
+    must(model.is_cycle, "a flip that one packet has led to from IDLE");
     must(1.0e-3f * (float)model.ready_ms + SLACK_S >= ivl_app.cfg.ready_s_min, "a flip without its time in READY");
     must(sdk.state.velocity.z + 1.0e-3f >= (d_m - 0.02f) * state->policy.theta[0], "a flip outside the policy's region");
     must((s->policy.crc == model.policy_crc) && (s->policy.seq == state->policy.id.seq), "a flip of another policy");
@@ -166,12 +149,34 @@ static void check_motors(ivl_phase_t phase)
     must(!turns || (phase != IVL_PHASE_IDLE) || (sdk.control.controlMode == controlModeLegacy), "the core turns a motor in IDLE");
 }
 
+// the check sums are made anew only where a byte is another one: they cost more than all the rest
+static void look_at_what_is_in_force(uint32_t *crc, uint32_t *cfg_crc)
+{
+    static ivl_policy_t policy;
+    static ivl_cfg_t    cfg;
+    static uint32_t     policy_crc;
+    static uint32_t     cfg_crc_seen;
+    if (memcmp(&policy, &ivl_app.state.policy, sizeof policy) != 0)
+    {
+        memcpy(&policy, &ivl_app.state.policy, sizeof policy);
+        policy_crc = ivl_policy_crc(&ivl_app.state.policy);
+    }
+    if (memcmp(&cfg, &ivl_app.cfg, sizeof cfg) != 0)
+    {
+        memcpy(&cfg, &ivl_app.cfg, sizeof cfg);
+        cfg_crc_seen = ivl_cfg_crc(&ivl_app.cfg);
+    }
+    *crc = policy_crc;
+    *cfg_crc = cfg_crc_seen;
+}
+
 static void check_in_force(void)
 {
     const ivl_policy_id_t now = ivl_app.state.policy.id;
-    const uint32_t        crc = ivl_policy_crc(&ivl_app.state.policy), cfg_crc = ivl_cfg_crc(&ivl_app.cfg);
-    const bool            is_same = (now.seq == model.policy_seq) && (crc == model.policy_crc);
-    const bool            is_open = (model.phase == IVL_PHASE_IDLE) || (model.phase == IVL_PHASE_READY);
+    uint32_t              crc, cfg_crc;
+    look_at_what_is_in_force(&crc, &cfg_crc);
+    const bool is_same = (now.seq == model.policy_seq) && (crc == model.policy_crc);
+    const bool is_open = (model.phase == IVL_PHASE_IDLE) || (model.phase == IVL_PHASE_READY);
     must(is_open || is_same, "a policy changed in flight");
     must((model.phase == IVL_PHASE_IDLE) || (cfg_crc == model.cfg_crc), "a configuration changed in flight");
     model.policy_crc = crc;
@@ -211,6 +216,7 @@ static void remember(ivl_phase_t phase)
 {
     model.ready_ms += (phase == IVL_PHASE_READY) ? 1 : 0;
     model.ready_ms = (phase == IVL_PHASE_IDLE) ? 0 : model.ready_ms;
+    model.is_cycle = (phase == IVL_PHASE_READY) || (model.is_cycle && (phase != IVL_PHASE_IDLE));
     if ((phase == IVL_PHASE_READY) && (model.phase != IVL_PHASE_READY))
     {
         model.ready_ms = 1;
@@ -430,6 +436,7 @@ static void switch_controller(uint8_t a)
         let_pass(1 + a);
         sdk.controller_runs = true;
     }
+    model.is_cycle = false;
     model.landed = model.landed || (ivl_app.state.phase != IVL_PHASE_IDLE) || ivl_app.state.guard.locked_out;
     controllerOutOfTreeInit();
     model.phase = IVL_PHASE_IDLE;
@@ -569,22 +576,20 @@ static event_t any_event(uint32_t *rng)
 
 static sequence_t make(uint32_t seed)
 {
-    uint32_t   rng = seed * 2654435761u + 0x9e3779b9u;
+    uint32_t   rng = random_of(seed);
     sequence_t s = {.n = 0};
-    rng = (rng == 0u) ? 1u : rng;
-    const int keep = (next_random(&rng) % 2u == 0u) ? 0 : (int)(next_random(&rng) % (1u + sizeof FLIGHT / sizeof FLIGHT[0]));
+    const int  keep = (next_random(&rng) % 2u == 0u) ? 0 : (int)(next_random(&rng) % (1u + sizeof FLIGHT / sizeof FLIGHT[0]));
     for (int i = 0; i < keep; i++)
     {
-        s.event[s.n++] = FLIGHT[i];
+        add(&s, FLIGHT[i]);
         if (next_random(&rng) % 4u == 0u)
         {
-            s.event[s.n++] = any_event(&rng);
+            add(&s, any_event(&rng));
         }
     }
-    const int more = 1 + (int)(next_random(&rng) % 30u);
-    for (int i = 0; (i < more) && (s.n < EVENTS_MAX); i++)
+    for (int more = 1 + (int)(next_random(&rng) % 30u); more > 0; more--)
     {
-        s.event[s.n++] = any_event(&rng);
+        add(&s, any_event(&rng));
     }
     return s;
 }
@@ -622,44 +627,6 @@ static const char *play(const sequence_t *s)
     return (broken != NULL) ? broken : "the stand-in for the SDK was asked for something that there is not";
 }
 
-static sequence_t without(const sequence_t *s, int from, int n)
-{
-    sequence_t shorter = {.n = s->n - n};
-    memcpy(shorter.event, s->event, (size_t)from * sizeof s->event[0]);
-    memcpy(shorter.event + from, s->event + from + n, (size_t)(s->n - from - n) * sizeof s->event[0]);
-    return shorter;
-}
-
-/// Leave out what can be left out, the largest pieces first, as long as the same thing breaks.
-static sequence_t shortest(sequence_t s, const char *what)
-{
-    for (int n = s.n / 2; n >= 1; n /= 2)
-    {
-        for (int from = 0; from + n <= s.n;)
-        {
-            const sequence_t  shorter = without(&s, from, n);
-            const char *const breaks_now = play(&shorter);
-            if ((breaks_now != NULL) && (strcmp(breaks_now, what) == 0))
-            {
-                s = shorter;
-            }
-            else
-            {
-                from++;
-            }
-        }
-    }
-    return s;
-}
-
-static void print(const sequence_t *s)
-{
-    for (int i = 0; i < s->n; i++)
-    {
-        printf("    %2d  %-13s %3u %3u\n", i + 1, NAMES[s->event[i].kind], s->event[i].a, s->event[i].b);
-    }
-}
-
 static bool all_was_visited(unsigned long number)
 {
     bool all = n_flips > number / 200u;
@@ -682,34 +649,13 @@ void tearDown(void)
 {
 }
 
+static void tell(unsigned long number)
+{
+    printf("sequences: %lu, %llu ms, %llu flips, nothing broken\n", number, (unsigned long long)n_ms, (unsigned long long)n_flips);
+}
+
 int main(int argc, char **argv)
 {
-    has_traitor = (argc > 1) && (strcmp(argv[argc - 1], "--traitor") == 0);
-    const int           n_numbers = argc - 1 - (has_traitor ? 1 : 0);
-    const unsigned long number = (n_numbers > 0) ? strtoul(argv[1], NULL, 10) : 0;
-    const unsigned long seed = (n_numbers > 1) ? strtoul(argv[2], NULL, 10) : 1;
-    if ((number == 0u) || (n_numbers > 2))
-    {
-        fprintf(stderr, "usage: sequences NUMBER [SEED] [--traitor]\n");
-        return 2;
-    }
-    for (unsigned long i = 0; i < number; i++)
-    {
-        const sequence_t  s = make((uint32_t)(seed * 1000003u + i));
-        const char *const what = play(&s);
-        if (what != NULL)
-        {
-            const sequence_t least = shortest(s, what);
-            printf("sequences: number %lu of seed %lu: %s\n", i, seed, what);
-            print(&least);
-            return 1;
-        }
-    }
-    printf("sequences: %lu, %llu ms, %llu flips, nothing broken\n", number, (unsigned long long)n_ms, (unsigned long long)n_flips);
-    if ((number >= 1000u) && !all_was_visited(number))
-    {
-        printf("sequences: some event or phase never came up\n");
-        return 1;
-    }
-    return 0;
+    const player_t player = {"sequences", NAMES, make, play, tell, all_was_visited};
+    return play_as_asked(&player, argc, argv, &has_traitor);
 }

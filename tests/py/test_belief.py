@@ -21,6 +21,7 @@ from ivl.belief.simulator import Simulator
 from ivl.family import Family, FamilyChoice, Spread
 from ivl.learners import EpheBelief, make_learner
 from ivl.learners.base import LANDED, RECORDING
+from ivl.learners.ephe import imagine
 from ivl.outcome import four_leg
 from ivl.plots import belief as belief_picture
 from ivl.report import learn_page
@@ -91,6 +92,21 @@ def test_a_recording_is_the_motion_after_the_trigger_up_to_the_contact(kin: Fami
     assert "battery" not in told  # this vehicle has none
     again, _ = recording.simulated(kin.world, FLIGHT, np.array([4.5, 8.0]), seed=3, stream=0)
     assert np.array_equal(features, again, equal_nan=True)
+
+
+def test_only_the_swing_after_the_contact_tells_soft_legs_from_stiff_ones(kin: Family) -> None:
+    soft, stiff = (kin.world.changed(**{"leg.stiffness": factor * 0.08}) for factor in (0.7, 1.3))
+    means = [
+        np.mean(
+            [recording.simulated(world, FLIGHT, np.array([4.5, 8.0]), seed=3, stream=k)[0] for k in range(8)], axis=0
+        )
+        for world in (soft, stiff)
+    ]
+    apart = dict(zip(recording.NAMES, np.abs(means[0] - means[1]), strict=True))
+    assert apart["swing_rate_020"] > 4.0  # rad/s; equal flights scatter by 3
+    before = [apart[name] for name in apart if name.startswith(recording.SIGNALS) and np.isfinite(apart[name])]
+    assert len(before) > 20
+    assert max(before) < 0.05  # degrees, rad/s, m
 
 
 def test_a_flight_without_a_trigger_records_nothing(kin: Family) -> None:
@@ -379,9 +395,10 @@ def test_the_safest_policy_lies_inside_the_window() -> None:
 
 def test_ephe_on_imagined_rollouts_converges_into_the_window() -> None:
     mu, sigma = np.array([5.0, 5.0]), np.array([1.5, 1.5])
-    rng = np.random.default_rng(2)
+    rng, floor = np.random.default_rng(2), np.array([0.05, 0.05])
+    reward = decide.imagined(Window(), NOTHING, BOUNDS, rng)  # type: ignore[arg-type]
     for _ in range(4):
-        mu, sigma = decide.ephe(Window(), NOTHING, mu, sigma, BOUNDS, rng, 300, 10, 0.7, np.array([0.05, 0.05]))  # type: ignore[arg-type]
+        mu, sigma = imagine(reward, mu, sigma, BOUNDS, rng, 300, 10, 0.7, floor)
     assert 3.9 < mu[0] < 4.3
     assert mu[1] > 7.0
     assert sigma[0] < 0.4

@@ -283,7 +283,11 @@ def test_kill_9_at_random_moments_and_resume_end_in_the_uninterrupted_result(
 
 def test_bench_without_mujoco_measures_this_simulator(capsys: Capture) -> None:
     data = json_of(["bench", "--no-mujoco", "--rollouts", "100"], capsys)
-    assert list(data) == ["rollouts_per_s_per_core", "steps_per_s_per_core", "ratio_to_mujoco"]
+    sets = ["friendly", "cell", "slowest_cell", "learner"]
+    assert list(data)[:2] == ["rollouts_per_s_per_core", "steps_per_s_per_core"]
+    assert all(data[f"rollouts_per_s_{name}"] > 0 and 0.3 < data[f"occupancy_{name}"] <= 1 for name in sets)
+    assert data[f"rollouts_per_s_in_{data['register_bits']:.0f}_bits"] > 0
+    assert data["machine"]
     assert data["rollouts_per_s_per_core"] > 100
     assert data["steps_per_s_per_core"] > 100 * data["rollouts_per_s_per_core"]
     assert data["ratio_to_mujoco"] is None

@@ -157,6 +157,56 @@ def test_discarded_rollouts_may_be_left_out_and_no_rollout_changes_nothing(name:
     assert np.isfinite(learner.ask()).all()
 
 
+FAR = [-1e300, -1e6, -3.0, -1e-300, 0.0, 1e-16, 4.0, 4.0 + 1e-15, 10.0, 1e6, 1e9, 1e300]
+ODD_RETURNS = [0.0, 5e-324, 1e-31, 1e-30, 1e-3, 1.0, 175.0, 1e30, 1e31, 1.7e308]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=25)
+@given(
+    told=st.lists(
+        st.lists(
+            st.tuples(st.sampled_from(FAR), st.sampled_from(FAR), st.sampled_from(ODD_RETURNS)), min_size=1, max_size=9
+        ),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_whatever_is_told_is_learned_from_or_refused_as_a_whole(
+    name: str, told: list[list[tuple[float, float, float]]]
+) -> None:
+    learner = new(name)
+    for rows in told:
+        table, before = np.array(rows), json.dumps(learner.state_dict(), allow_nan=False)
+        try:
+            learner.tell(table[:, :2], table[:, 2])
+        except LearnerError:
+            assert json.dumps(learner.state_dict(), allow_nan=False) == before
+            continue
+        json.dumps(learner.state_dict(), allow_nan=False)
+        result, asked = learner.result, learner.ask(3)
+        for array in (result.mu, result.sigma, result.recommended, asked):
+            assert np.isfinite(array).all()
+        assert ((asked >= learner.lo) & (asked <= learner.hi)).all()
+        assert ((result.recommended >= learner.lo) & (result.recommended <= learner.hi)).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_range_of_what_is_told_ends_where_it_says(name: str) -> None:
+    for bad in (5e-324, 0.9e-30, 1.1e30):
+        with pytest.raises(
+            LearnerError, match=r"tell: rewards: value .* is out of range \(allowed 0, 1e-30 \.\. 1e\+30\)"
+        ):
+            new(name).tell(np.full((1, 2), 4.0), [bad])
+    learner = new(name)
+    edge = learner.mu0 + np.array([[1e6, 0.0]]) * learner.sigma0
+    with pytest.raises(LearnerError, match=r"theta: value .* is more than 1e\+06 \* sigma0 from mu0"):
+        learner.tell(1.001 * edge, [1.0])
+    learner.tell(np.vstack([0.999 * edge, learner.ask(7)]), np.linspace(1e-30, 1e30, 8))
+    assert learner.result.n_told == 8
+
+
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("reward", [0.0, 175.0])
 def test_equal_returns_are_survived(name: str, reward: float) -> None:

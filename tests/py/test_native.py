@@ -1,10 +1,14 @@
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from ivl import native
 from ivl.errors import NativeError
+from ivl.world import World
+
+widest = native.library().use_registers()
 
 
 def test_load_says_how_to_build_when_the_library_is_missing(tmp_path: Path) -> None:
@@ -36,6 +40,53 @@ def test_library_can_be_chosen_by_the_environment(monkeypatch: pytest.MonkeyPatc
     copy.write_bytes(native.library().path.read_bytes())
     monkeypatch.setenv(native.LIBRARY_ENV, str(copy))
     assert native.library.__wrapped__().path == copy
+
+
+def random_landings(seed: int, n: int) -> npt.NDArray[np.void]:
+    """Landings of every kind: any approach and policy, all ways to start, some of them hopeless."""
+    rng = np.random.default_rng(seed)
+    specs = native.library().default_specs(n)
+    specs["speed_mps"], specs["angle_deg"] = rng.uniform(0.3, 4.0, n), rng.uniform(15.0, 90.0, n)
+    specs["theta"][:, 0], specs["theta"][:, 1] = rng.uniform(0.5, 8.0, n), rng.uniform(0.0, 0.012, n)
+    specs["start"] = rng.integers(0, 3, n)
+    specs["seed"], specs["stream"] = seed, np.arange(n)
+    return specs
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "sensing"),
+    [("habas2021", {}), ("crazyflie21", {"sense.gyro_noise": 0.05, "sense.latency": 0.01, "rrev.rate": 50.0})],
+)
+def test_landings_have_the_same_bits_in_registers_of_any_width(vehicle: str, sensing: dict[str, float]) -> None:
+    library, world = native.library(), World(vehicle, "wide_short", "table1", **sensing)
+    specs, found = random_landings(5, 101), {}
+    try:
+        for bits in (128, 256, 512, 0):
+            if bits <= widest:
+                library.use_registers(bits)
+                found[bits], occupancy = world.native_model.rollouts_and_occupancy(specs, 2)
+                assert 0.5 < occupancy <= 1
+    finally:
+        library.use_registers()
+    assert len({outcomes.tobytes() for outcomes in found.values()}) == 1
+    assert len(set(found[0]["end_reason"])) >= 3
+
+
+def test_registers_are_those_of_the_environment_or_the_widest(monkeypatch: pytest.MonkeyPatch) -> None:
+    try:
+        monkeypatch.setenv(native.REGISTER_BITS_ENV, "128")
+        assert native.NativeLibrary(native.library().path).use_registers(128) == 128
+        monkeypatch.setenv(native.REGISTER_BITS_ENV, "96")
+        with pytest.raises(NativeError, match="no registers of 96 bits here"):
+            native.NativeLibrary(native.library().path)
+    finally:
+        assert native.library().use_registers() == widest
+
+
+@pytest.mark.parametrize("bits", [1, 64, 192, 1024, "wide", "-1", ""])
+def test_registers_that_no_machine_has_are_refused(bits: int | str) -> None:
+    with pytest.raises(NativeError, match=f"no registers of {bits} bits here"):
+        native.library().use_registers(bits)
 
 
 def test_tables_describe_fields_that_do_not_overlap_and_have_a_unit_and_a_doc() -> None:

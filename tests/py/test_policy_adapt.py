@@ -12,6 +12,7 @@ from ivl import cli, forms
 from ivl.belief import every, recording
 from ivl.belief.posterior import Evidence
 from ivl.errors import ConfigError
+from ivl.learners.ephe import imagine
 from ivl.policy import adapt, file
 from ivl.policy.flying import Place, PolicyTask
 from ivl.policy.region import BOX
@@ -105,9 +106,9 @@ def test_ephe_finds_a_window_that_depends_on_the_approach() -> None:
     sigma = np.full(len(mu), 0.2)
     bounds = mu[:, None] + 5.0 * np.array([-1.0, 1.0])
     before = every.margin_rate(belief, form, mu[None], FLIGHTS)[0]
-    found, spread = every.ephe(
-        belief, form, mu, sigma, bounds, FLIGHTS, np.random.default_rng(2), 300, 60, 0.9, 0.02 * sigma
-    )
+    rng = np.random.default_rng(2)
+    reward = every.imagined(belief, form, FLIGHTS, rng)
+    found, spread = imagine(reward, mu, sigma, bounds, rng, 300, 60, 0.9, 0.02 * sigma)
     assert before < 0.2
     assert every.margin_rate(belief, form, found[None], FLIGHTS)[0] > 0.75
     assert every.rate(belief, form, found[None], FLIGHTS)[0] > 0.9

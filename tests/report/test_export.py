@@ -307,6 +307,18 @@ def test_rerun_has_the_pose_and_the_series(flown: flight.Flight, rows: Any, tmp_
     assert sum(batch.num_rows for batch in found["/world/feet"]) == len(rows)
 
 
+def test_rerun_keeps_different_landings_apart_when_recordings_are_merged(spec: LandingSpec, tmp_path: Path) -> None:
+    from rerun.chunk import RrdReader
+
+    found = []
+    for i, changes in enumerate(({}, {"seed": 1}, {"speed_mps": spec.speed_mps + 1e-6}, {})):
+        path = tmp_path / f"{i}.rrd"
+        export.write(flight.of_spec(spec.model_copy(update=changes), "a landing"), path, Format.RRD)
+        found += [entry.recording_id for entry in RrdReader(path).recordings()]
+    assert len(set(found)) == 3
+    assert found[0] == found[3]
+
+
 def test_without_rerun_the_message_says_what_to_install(tmp_path: Path) -> None:
     program = (
         "import sys; sys.modules['rerun'] = None\n"

@@ -237,6 +237,11 @@ def test_a_local_cluster_is_its_owner_s_alone() -> None:
     ("limit", "workers", "message"),
     [
         ((resource.RLIMIT_NOFILE, 40), 2, "--workers 2: needs 112 open files, allowed are 40: raise the limit"),
+        (
+            (resource.RLIMIT_AS, 900 * 2**20),
+            8,
+            "--workers 8: each process may have 900 MiB of address space, a sweep needs about 1900 MiB: raise",
+        ),
         ((resource.RLIMIT_RSS, 2**30), 8, "--workers 8: needs 2800 MiB of memory, here are 1024 MiB: use --workers 2"),
     ],
 )
@@ -253,6 +258,19 @@ def test_what_a_cluster_needs_is_said_before_it_starts(
     assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("fault", [AssertionError("Status.init"), OSError(12, "Cannot allocate memory"), MemoryError()])
+def test_a_cluster_that_cannot_be_started_is_one_line(monkeypatch: pytest.MonkeyPatch, fault: Exception) -> None:
+    def refuse(**_: Any) -> None:
+        raise fault
+
+    monkeypatch.setattr(cluster._dask, "LocalCluster", refuse)
+    with pytest.raises(RolloutError, match=r"2 workers cannot be started: .*\(try fewer --workers, then --resume\)"):
+        cluster._local(2)
+    monkeypatch.setattr(cluster, "_address_space_bytes", lambda: 2**31)
+    with pytest.raises(ConfigError, match=r"2 workers cannot be started: .* 2048 MiB of address space, .*ulimit -v"):
+        cluster._local(2)
 
 
 def test_a_task_that_never_ends_is_given_up_with_a_clear_word() -> None:

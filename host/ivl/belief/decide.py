@@ -11,8 +11,10 @@ with one timing and one moment out of the margin, and
 
     w_k = max(0, r_k - mean(r)),   mu' = sum(w_k theta_k) / sum(w_k),   sigma'^2 = sum(w_k (theta_k - mu)^2) / sum(w_k)
 
-as in `ivl.learners.ephe` with above-mean weights about the old mean.
+which is `ivl.learners.ephe.imagine` with the returns of `imagined`.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -20,14 +22,12 @@ from scipy.interpolate import RegularGridInterpolator  # type: ignore[import-unt
 
 from ivl.belief.correction import Correction
 from ivl.belief.posterior import Belief
-from ivl.learners.base import draw_truncated
-from ivl.learners.ephe import above_mean, most_likely
 
 FloatArray = npt.NDArray[np.float64]
 
 TIMING_S, MOMENT = 0.010, 0.10
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-_N_RREV, _N_MOMENT, _N_NEAR = 57, 12, 60
+_N_RREV, _N_MOMENT, _N_NEAR = 57, 12, 30
 _LEAST_AHEAD_S = 1e-3
 _N_FIRST, _HOPELESS = 16, 0.01
 """A first look with so many particles leaves out the policies whose rate is below this."""
@@ -85,41 +85,15 @@ def safest(
     return near[top], float(rates[top])
 
 
-def ephe(
-    belief: Belief,
-    corrected: Correction,
-    mu: FloatArray,
-    sigma: FloatArray,
-    bounds: FloatArray,
-    rng: np.random.Generator,
-    n: int,
-    iterations: int,
-    shrink_min: float,
-    floor: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Where EPHE goes from (mu, sigma) on imagined rollouts.
+def imagined(
+    belief: Belief, corrected: Correction, bounds: FloatArray, rng: np.random.Generator
+) -> Callable[[FloatArray], FloatArray]:
+    """Returns of imagined rollouts of policies, shape (n, 2): each of one particle, with errors out of the margin."""
 
-    Args:
-        belief: Over vehicles.
-        corrected: By what flights did.
-        mu: Centre, shape (2,).
-        sigma: Spread, shape (2,).
-        bounds: Box of the policies, shape (2, 2).
-        rng: Of the imagined rollouts.
-        n: Imagined rollouts an iteration.
-        iterations: Updates.
-        shrink_min: Share of itself that sigma keeps at least in an update.
-        floor: Smallest sigma, shape (2,).
-    """
-    lo, hi = bounds.T
-    for _ in range(iterations):
-        theta = draw_truncated(rng, mu, sigma, lo, hi, n)
+    def reward(theta: FloatArray) -> FloatArray:
+        n = len(theta)
         late, moment = rng.uniform(-TIMING_S, TIMING_S, n), rng.uniform(-MOMENT, MOMENT, n)
         flown = perturbed(theta, late, moment, bounds)
-        reward = corrected(flown, belief.rate_of_one(flown))
-        weights = above_mean(reward)
-        if not weights.any():
-            break
-        mean, spread = most_likely(theta, weights, mu)
-        mu, sigma = mean, np.clip(spread, np.maximum(shrink_min * sigma, floor), hi - lo)
-    return mu, sigma
+        return corrected(flown, belief.rate_of_one(flown))
+
+    return reward

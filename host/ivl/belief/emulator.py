@@ -8,7 +8,7 @@ Fitted to a bank (`ivl.belief.bank`). u are the numbers of the member and of the
     landing       P(landed | u): a mean of small neural networks (scikit-learn), each from its own seed
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -25,6 +25,7 @@ USED = tuple(
     name
     for name in recording.NAMES
     if name in ("closing", "contact_time", "contact_distance")
+    or name.startswith("swing_")
     or name.endswith(("_050", "_090", "_130", "_170", "_210"))
 )
 """Features that are emulated; the others say the same again."""
@@ -38,9 +39,13 @@ _REST_HIDDEN, _REST_EPOCHS, _REST_PENALTY, _REST_BATCH, _REST_RATE = (128, 128),
 _OUTLIER = 10.0
 """The network of the recordings; residuals count up to `_OUTLIER` of their typical size (1.48 median |residual|)."""
 _MAD = 1.4826
+_ROWS_MAX = 1000
+"""Rows that are worked on together: their terms stay in the cache of a core."""
 _NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 40, 0.3
 _BATCH, _RATE = 400, 1e-3
 
+Rows = npt.NDArray[Any]
+"""Rows of numbers in single or double precision, shape (n, ...)."""
 Net = Sequence[tuple[FloatArray, FloatArray]]
 """Weights and biases of the layers of a network."""
 
@@ -112,18 +117,28 @@ class RecordingEmulator:
 
     def mean(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """Expected features of members z, shape (n, d), in flights, shape (n, ...): shape (n, n_used)."""
-        u = np.concatenate([z, self.scale(theta, conditions)], axis=1)
-        expected = _terms(u, theta.shape[1]) @ self.weights
+        return _in_parts(self._mean, z, theta, conditions)
+
+    def _mean(self, z: FloatArray, theta: FloatArray, conditions: FloatArray) -> FloatArray:
+        u: Rows = np.concatenate([z, self.scale(theta, conditions)], axis=1, dtype=np.float32)
+        expected: Rows = (_terms(u, theta.shape[1]) @ self.weights.astype(np.float32)).astype(np.float64)
         return expected + self.spread * forward(self.net, u) if self.net else expected
 
 
-def forward(net: Net, u: FloatArray) -> FloatArray:
+def _in_parts(function: Callable[..., FloatArray], *rows: FloatArray) -> FloatArray:
+    """A function of rows, arrays of shape (n, ...), part by part."""
+    firsts = range(0, max(len(rows[0]), 1), _ROWS_MAX)
+    return np.concatenate([function(*(array[first : first + _ROWS_MAX] for array in rows)) for first in firsts])
+
+
+def forward(net: Net, u: Rows) -> FloatArray:
     """Output of a network with rectifiers, in single precision, shape (n, n_out)."""
-    h: npt.NDArray[Any] = u.astype(np.float32)
+    h: Rows = np.asarray(u, dtype=np.float32)
     for number, (weight, bias) in enumerate(net):
-        h = h @ weight + bias
+        h = h @ weight
+        h += bias
         if number + 1 < len(net):
-            h = np.maximum(h, 0.0)
+            np.maximum(h, 0.0, out=h)
     return h.astype(np.float64)
 
 
@@ -133,11 +148,21 @@ def _layers(net: Any) -> Net:
     return [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in pairs]
 
 
-def _terms(u: FloatArray, dim: int) -> FloatArray:
-    """One, all of u, all products of two, and the cubes of policy and conditions, the last of u; dim of the policy."""
-    i, j = np.triu_indices(u.shape[1])
-    last = u[:, -(dim + len(recording.CONDITIONS)) :]
-    return np.concatenate([np.ones((len(u), 1)), u, u[:, i] * u[:, j], last**3], axis=1)
+def _terms(u: Rows, dim: int) -> Rows:
+    """One, all of u, all products of two, and the cubes of policy and conditions, the last of u; dim of the policy.
+
+    Shape (n, n_terms), of the type of u; a column lies in one piece of memory, since columns are multiplied.
+    """
+    rows = np.ascontiguousarray(u.T)
+    d, n_cubes = len(rows), dim + len(recording.CONDITIONS)
+    found = np.empty((1 + d + d * (d + 1) // 2 + n_cubes, len(u)), dtype=u.dtype)
+    found[0], found[1 : 1 + d] = 1.0, rows
+    first = 1 + d
+    for i in range(d):
+        np.multiply(rows[i:], rows[i], out=found[first : first + d - i])
+        first += d - i
+    found[first:] = rows[-n_cubes:] ** 3
+    return found.T
 
 
 def fit_recordings(bank: Bank, scale: Scale, seed: int = 0) -> RecordingEmulator:
@@ -248,7 +273,8 @@ class LandingEmulator:
         """Member, flight, and what it is expected to record: the motion decides the landing."""
         s = self.recordings.scale(theta, conditions)
         mean = self.recordings.mean(z, theta, conditions) if recorded is None else recorded
-        return np.concatenate([z, s, s[:, : theta.shape[1]] ** 2, (mean - self.centre) / self.spread], axis=1)
+        parts = [z, s, s[:, : theta.shape[1]] ** 2, (mean - self.centre) / self.spread]
+        return np.concatenate(parts, axis=1, dtype=np.float32)
 
     def rate(
         self, z: FloatArray, theta: FloatArray, conditions: FloatArray, recorded: FloatArray | None = None
@@ -257,7 +283,10 @@ class LandingEmulator:
 
         `recorded` is what they are expected to record, shape (n, n_used), if it is known already.
         """
-        u = self.inputs(z, theta, conditions, recorded)
+        return _in_parts(self._rate, z, theta, conditions, *(() if recorded is None else (recorded,)))
+
+    def _rate(self, *flights: FloatArray) -> FloatArray:
+        u = self.inputs(*flights)
         return np.asarray(np.mean([expit(forward(net, u)[:, 0]) for net in self.nets], axis=0))
 
 

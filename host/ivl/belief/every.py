@@ -8,6 +8,7 @@ The landing rate of a policy is its mean over approaches that are spread evenly 
 with margin, over a trigger up to 10 ms early or late and a moment up to 10 % smaller or larger (`ivl.belief.decide`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,6 @@ from scipy.stats import qmc  # type: ignore[import-untyped]
 
 from ivl.belief import decide
 from ivl.belief.posterior import Belief
-from ivl.learners.base import draw_truncated
-from ivl.learners.ephe import above_mean, most_likely
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -83,49 +82,21 @@ def rate(belief: Belief, form: Linear, theta: FloatArray, box: FloatArray) -> Fl
     return np.asarray(belief.rates(flights.reshape(-1, 4)).mean(axis=0).reshape(flights.shape[:-1]).mean(axis=-1))
 
 
-def ephe(
-    belief: Belief,
-    form: Linear,
-    mu: FloatArray,
-    sigma: FloatArray,
-    bounds: FloatArray,
-    box: FloatArray,
-    rng: np.random.Generator,
-    n: int,
-    iterations: int,
-    shrink_min: float,
-    floor: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Where EPHE goes from (mu, sigma) on imagined flights at the approaches of `form`, see `ivl.belief.decide.ephe`.
+def imagined(
+    belief: Belief, form: Linear, box: FloatArray, rng: np.random.Generator
+) -> Callable[[FloatArray], FloatArray]:
+    """Returns of policies, shape (m, dim): means over imagined flights, as in `ivl.belief.decide.imagined`.
 
-    All policies of an update meet the same approaches, so that they differ in what they are and not in their luck.
-
-    Args:
-        belief: Over vehicles.
-        form: Threshold and moment at the approaches.
-        mu: Centre, shape (dim,).
-        sigma: Spread, shape (dim,).
-        bounds: Box of the policies, shape (dim, 2).
-        box: Box of flights, shape (4, 2).
-        rng: Of the imagined flights.
-        n: Policies of an update.
-        iterations: Updates.
-        shrink_min: Share of itself that sigma keeps at least in an update.
-        floor: Smallest sigma, shape (dim,).
+    All policies meet the same approaches, so that they differ in what they are and not in their luck.
     """
-    lo, hi = bounds.T
-    for _ in range(iterations):
-        theta = draw_truncated(rng, mu, sigma, lo, hi, n)
+
+    def reward(theta: FloatArray) -> FloatArray:
         at = rng.integers(len(form.approaches), size=_SHOTS)
         flights = form.of(at).flights(theta, float(box[1, 1]))
         late = rng.uniform(-decide.TIMING_S, decide.TIMING_S, len(at))
         moment = rng.uniform(-decide.MOMENT, decide.MOMENT, len(at))
         flown = decide.perturbed(flights[..., :2], late, moment, box[:2])
         whole = np.concatenate([flown, flights[..., 2:]], axis=-1)
-        reward = belief.rate_of_one(whole.reshape(-1, 4)).reshape(len(theta), -1).mean(axis=1)
-        weights = above_mean(reward)
-        if not weights.any():
-            break
-        mean, spread_ = most_likely(theta, weights, mu)
-        mu, sigma = mean, np.clip(spread_, np.maximum(shrink_min * sigma, floor), hi - lo)
-    return mu, sigma
+        return np.asarray(belief.rate_of_one(whole.reshape(-1, 4)).reshape(len(theta), -1).mean(axis=1))
+
+    return reward

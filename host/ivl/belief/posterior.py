@@ -34,6 +34,7 @@ FloatArray = npt.NDArray[np.float64]
 _SIZES = {"pitch": 4.0, "rate": 0.8, "fall": 0.005}
 _AT_S, _ALIKE_S = 0.2, 0.1
 _OTHERS = {"contact_time": 0.004, "contact_distance": 0.005, "closing": 0.03}
+_AFTER_CONTACT = {"swing_pitch": 6.0, "swing_rate": 3.0}
 _MOVES, _LAST_MOVES = 6, 24
 _BETA_START, _BETA_MIN, _BETA_MAX, _ACCEPTED = 0.4, 0.02, 0.8, 0.3
 _DIFFERENCE, _JITTER, _WHOLE = 2.38, 0.02, 0.1
@@ -43,7 +44,7 @@ _EFFECTIVE, _HALVINGS, _LEAST_STEP = 0.5, 20, 1e-3
 RATED = 128
 """Particles that tell landing rates; more of them say the same, and a decision asks for thousands of policies."""
 _GOLDEN, _TINY = 0.6180339887498949, 1e-6
-_N_CONDITIONS, _P_MIN, _ROWS_MAX = 9, 1e-6, 20_000
+_N_CONDITIONS, _P_MIN = 9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -74,12 +75,17 @@ class Evidence:
 
 
 def discrepancy(factor: float) -> FloatArray:
-    """D, shape (n_used, n_used): 4 degrees, 0.8 rad/s and 5 mm at 200 ms, growing as the square of time, smooth."""
+    """D, shape (n_used, n_used): 4 degrees, 0.8 rad/s and 5 mm at 200 ms, growing as the square of time, smooth.
+
+    After the contact 6 degrees and 3 rad/s at any time: contacts are modelled less well than the flight before them.
+    """
     split = [name.rpartition("_") for name in USED]
-    signal = [stem if stem in _SIZES else name for (stem, _, _), name in zip(split, USED, strict=True)]
-    time_s = np.array([float(end) / 1000.0 if stem in _SIZES else 0.0 for stem, _, end in split])
+    in_time = _SIZES | _AFTER_CONTACT
+    signal = [stem if stem in in_time else name for (stem, _, _), name in zip(split, USED, strict=True)]
+    time_s = np.array([float(end) / 1000.0 if stem in in_time else 0.0 for stem, _, end in split])
+    flat = _OTHERS | _AFTER_CONTACT
     size = np.array(
-        [_SIZES[s] * (t / _AT_S) ** 2 if s in _SIZES else _OTHERS[s] for s, t in zip(signal, time_s, strict=True)]
+        [flat[s] if s in flat else _SIZES[s] * (t / _AT_S) ** 2 for s, t in zip(signal, time_s, strict=True)]
     )
     same = np.array([[a == b for b in signal] for a in signal])
     alike = np.where(same, np.exp(-np.abs(time_s[:, None] - time_s) / _ALIKE_S), 0.0)
@@ -224,9 +230,7 @@ class Belief:
         quantiles = np.stack([(at + 0.5) / n, (0.5 + at * _GOLDEN) % 1.0], axis=1)
         conditions = np.repeat(self._recordings.scale.conditions(quantiles), len(theta), axis=0)
         flights = np.repeat(self.z[:n], len(theta), axis=0), np.tile(theta, (n, 1)), conditions
-        parts = [slice(first, first + _ROWS_MAX) for first in range(0, len(conditions), _ROWS_MAX)]
-        rates = [self._landings.rate(*(array[part] for array in flights)) for part in parts]
-        return np.concatenate(rates).reshape(n, len(theta))
+        return self._landings.rate(*flights).reshape(n, len(theta))
 
     def rate_of_one(self, theta: FloatArray) -> FloatArray:
         """Landing rate of policies, shape (m, dim), each of one particle under drawn conditions: shape (m,)."""

@@ -4,6 +4,7 @@ In simulation (`simulated`), by its recorder (`of_recorder`), or in a log that w
 
     pitch, rate, fall     at `TIMES_S` after the trigger, up to the first contact
     at_contact            time after the trigger, pitch, rate and fall at the first contact
+    swing_pitch, swing_rate   at `SWING_S` after that contact; only they tell legs and feet apart
     closing               closing speed just before the trigger
     battery               battery voltage in the hover before the approach
     overshoot             share by which RREV was above the policy's threshold when the trigger fired
@@ -32,10 +33,13 @@ Rows = npt.NDArray[np.void]
 
 TIMES_S = np.arange(0.03, 0.231, 0.02)
 SIGNALS = ("pitch", "rate", "fall")
+SWING_S = np.array([0.02, 0.04, 0.06])
+SWING_SIGNALS = ("swing_pitch", "swing_rate")
 AT_CONTACT = ("contact_time", "contact_pitch", "contact_rate", "contact_distance")
 NAMES = (
-    *(f"{signal}_{round(1000 * t):03d}" for signal in SIGNALS for t in TIMES_S), *AT_CONTACT, "closing",
-    "battery", "overshoot",
+    *(f"{signal}_{round(1000 * t):03d}" for signal in SIGNALS for t in TIMES_S), *AT_CONTACT,
+    *(f"{signal}_{round(1000 * t):03d}" for signal in SWING_SIGNALS for t in SWING_S),
+    "closing", "battery", "overshoot",
 )  # fmt: skip
 N = len(NAMES)
 CONDITIONS = np.array([NAMES.index("battery"), NAMES.index("overshoot")])
@@ -176,7 +180,7 @@ def of_recorder(
     end_s = contact_s if contact_is_seen else contact_s - _NOTICED_LATE_S
     features = _features(t_s, pitch, -rows["w_B_radps"][:, 1], distance, closing, end_s, conditions)
     if not contact_is_seen:
-        features[[NAMES.index(name) for name in AT_CONTACT]] = np.nan
+        features[[NAMES.index(name) for name in NAMES if name.startswith(("contact_", "swing_"))]] = np.nan
     return features
 
 
@@ -235,8 +239,11 @@ def _features(
     at_contact = np.full(len(AT_CONTACT), np.nan)
     if np.isfinite(contact_s) and contact_s <= t_s[-1]:
         at_contact = np.array([contact_s, *(float(np.interp(contact_s, t_s, s)) for s in (*signals[:2], distance))])
+    swing_s = contact_s + SWING_S
+    recorded = swing_s <= t_s[-1]  # not after the end of the recording, nor without a contact
+    swing = [np.where(recorded, np.interp(swing_s, t_s, signal), np.nan) for signal in signals[:2]]
     before = float(np.interp(-_CLOSING_BEFORE_S, t_s, closing))
-    return np.concatenate([*at_times, at_contact, [before, *conditions]])
+    return np.concatenate([*at_times, at_contact, *swing, [before, *conditions]])
 
 
 def table(features: FloatArray) -> Mapping[str, float]:

@@ -36,11 +36,11 @@ from ivl.belief.recording import Flight
 from ivl.family import Family
 
 MEMBERS, _FLIGHTS, _SEED = 2400, 16, 20210701
-VERSION = 5
+VERSION = 6
 """Of how emulators are made; cached ones of another version are not used."""
 _CANDIDATES, _LIKELY, _LEAST = 96, 0.85, 0.02
 """Second half: policies to choose from, share of flights that are chosen, and a rate that none of them is below."""
-_ROUGH_EPOCHS, _ROWS_MAX = 12, 20_000
+_ROUGH_EPOCHS = 12
 
 
 @dataclass(frozen=True)
@@ -116,9 +116,7 @@ def _promising(
     candidates = rng.uniform(lo, hi, (n, _CANDIDATES, len(lo)))
     members = np.repeat(z, _CANDIDATES, axis=0)
     flat, unknown = candidates.reshape(len(members), -1), np.full((len(members), len(recording.CONDITIONS)), np.nan)
-    parts = [slice(first, first + _ROWS_MAX) for first in range(0, len(members), _ROWS_MAX)]
-    rates = np.concatenate([landings.rate(members[part], flat[part], unknown[part]) for part in parts])
-    weights = np.maximum(rates, _LEAST).reshape(n, _CANDIDATES).cumsum(axis=1)
+    weights = np.maximum(landings.rate(members, flat, unknown), _LEAST).reshape(n, _CANDIDATES).cumsum(axis=1)
     at = rng.random((n, _FLIGHTS, 1)) * weights[:, None, -1:]
     chosen = np.minimum((weights[:, None] < at).sum(axis=-1), _CANDIDATES - 1)
     any_policy = rng.random((n, _FLIGHTS)) >= _LIKELY

@@ -1,17 +1,20 @@
 """`ivl bench`."""
 
 import importlib.util
+import platform
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 import typer
 
-from ivl import experiment
+from ivl import experiment, native
 from ivl.cli import console
 from ivl.errors import IvlError, LinkError
 from ivl.links import pil
@@ -22,7 +25,8 @@ HELP = """Measure the simulator on one core, and against MuJoCo.
 \b
 Examples:
   ivl bench
-      rollouts and physics steps per second, ratio to the same landing in MuJoCo
+      rollouts and physics steps per second, ratio to the same landing in MuJoCo; the same for harder sets
+      of landings and for each width of registers; with the name of the machine
   ivl bench --json
       for a script
   ivl bench --no-mujoco
@@ -34,6 +38,7 @@ Examples:
       and how fast it runs freely while cflib logs
 """
 _EXPERIMENT = "experiments/paper_vertical.yaml"
+_REGISTER_BITS = (128, 256, 512)
 _MUJOCO_BENCH = Path(__file__).parents[3] / "tests" / "mujoco" / "bench.py"
 
 
@@ -46,7 +51,9 @@ def bench(
 ) -> None:
     """Measure speed; HELP is the text that people see."""
     compare = _mujoco_rate() if mujoco else None
-    result = measure(experiment.load(_EXPERIMENT).make_world(), n)
+    world = experiment.load(_EXPERIMENT).make_world()
+    result = measure(world, n)
+    result |= _sets(world, n) | _registers(world, n) | {"machine": _machine()}
     result["ratio_to_mujoco"] = result["rollouts_per_s_per_core"] / compare() if compare else None
     if on_chip:
         result |= pil.measure()
@@ -56,7 +63,8 @@ def bench(
         console.print_json(result)
     else:
         for name, value in result.items():
-            console.out.print(f"{name:28s} {console.number(value, 1)}")
+            text = value if isinstance(value, str) else console.number(value, 3 if name.startswith("occupancy") else 1)
+            console.out.print(f"{name:36s} {text}")
 
 
 def measure(world: World, n: int) -> dict[str, Any]:
@@ -64,15 +72,82 @@ def measure(world: World, n: int) -> dict[str, Any]:
 
     The time is the processor time of that thread, as for MuJoCo, so that a busy machine does not change the figures.
     """
-    rng = np.random.default_rng(0)
-    theta = rng.uniform(4.5, 5.1, n), rng.uniform(7.0, 9.0, n)  # of the paper's form
-    best_s, steps = np.inf, 0
+    rate, _, steps = _fly(world, Landings(n, 2.5, 90.0, (4.5, 5.1), (7.0e-3, 9.0e-3)))
+    return {"rollouts_per_s_per_core": rate, "steps_per_s_per_core": rate * steps}
+
+
+@dataclass(frozen=True)
+class Landings:
+    """A set of landings: how many, their approach, and the range of their policies (paper's form, SI)."""
+
+    n: int
+    speed_mps: float
+    angle_deg: float
+    rrev_per_s: tuple[float, float]
+    moment_Nm: tuple[float, float]
+
+    def specs(self) -> npt.NDArray[np.void]:
+        """One record a landing."""
+        rng = np.random.default_rng(0)
+        specs = native.library().default_specs(self.n)
+        specs["speed_mps"], specs["angle_deg"], specs["stream"] = self.speed_mps, self.angle_deg, np.arange(self.n)
+        specs["theta"][:, 0] = rng.uniform(*self.rrev_per_s, self.n)
+        specs["theta"][:, 1] = rng.uniform(*self.moment_Nm, self.n)
+        return specs
+
+
+def _fly(world: World, landings: Landings, at_once: int | None = None) -> tuple[float, float, float]:
+    """Fly landings on one thread, some at a time, three times: best rate (1/s), occupancy, steps a landing."""
+    specs, model = landings.specs(), world.native_model
+    parts = np.split(specs, range(at_once, specs.size, at_once)) if at_once else [specs]
+    best_s, flown = np.inf, []
     for _ in range(3):
         began = time.thread_time()
-        outcomes = world.rollouts(2.5, 90.0, *theta, threads=1)
+        flown = [model.rollouts_and_occupancy(part, 1) for part in parts]
         best_s = min(best_s, time.thread_time() - began)
-        steps = int(outcomes.n_steps.sum())
-    return {"rollouts_per_s_per_core": n / best_s, "steps_per_s_per_core": steps / best_s}
+    steps = sum(int(outcomes["n_steps"].sum()) for outcomes, _ in flown) / specs.size
+    return specs.size / best_s, float(np.mean([occupancy for _, occupancy in flown])), steps
+
+
+def _sets(world: World, n: int) -> dict[str, float]:
+    """Rates and occupancies of what a campaign is made of: landings, a cell, its slowest cell, a learner's calls."""
+    every = (0.5, 8.0), (0.0, 12.0e-3)  # as learners explore
+    few = max(n // 10, 100)
+    sets: dict[str, tuple[Landings, int | None]] = {
+        "friendly": (Landings(n, 2.5, 90.0, (4.5, 5.1), (7.0e-3, 9.0e-3)), None),
+        "cell": (Landings(n, 2.25, 60.0, *every), 256),
+        "slowest_cell": (Landings(few, 0.25, 60.0, *every), 256),
+        "learner": (Landings(n, 2.5, 90.0, *every), 8),
+    }
+    result = {}
+    for name, (landings, at_once) in sets.items():
+        rate, occupancy, _ = _fly(world, landings, at_once)
+        result |= {f"rollouts_per_s_{name}": rate, f"occupancy_{name}": occupancy}
+    return result
+
+
+def _registers(world: World, n: int) -> dict[str, float]:
+    """The rate of the friendly set in registers of each width that the machine has."""
+    library = native.library()
+    chosen = library.register_bits()
+    try:
+        widest = library.use_registers()
+        result = {}
+        for bits in _REGISTER_BITS:
+            if bits <= widest:
+                library.use_registers(bits)
+                result[f"rollouts_per_s_in_{bits}_bits"] = measure(world, n)["rollouts_per_s_per_core"]
+    finally:
+        library.use_registers(chosen)
+    return result | {"register_bits": chosen}
+
+
+def _machine() -> str:
+    """Name of the processor, as the system tells it; speeds say little without it."""
+    told = Path("/proc/cpuinfo")
+    lines = told.read_text().splitlines() if told.is_file() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
 
 
 def _udp_rates() -> dict[str, float]:

@@ -29,6 +29,10 @@ FloatArray = npt.NDArray[np.float64]
 Meta = Mapping[str, npt.NDArray[Any]]
 LANDED = "landed"
 """Name in `Meta` under which a learner is told which rollouts were landings (`ivl.outcome.four_leg`)."""
+RETURN_MIN, RETURN_MAX = 1e-30, 1e30
+"""Returns are 0 or within this range, policies within so many spreads of the first centre: squares of either, and sums
+of them, are then numbers, whatever a learner does with them."""
+SPREADS_MAX = 1e6
 RECORDING = "recording"
 """Name in `Meta` of what rollouts recorded of their flip, shape (n, `ivl.belief.recording.N`), NaN where nothing."""
 
@@ -137,20 +141,19 @@ class Learner(ABC):
 
         Args:
             theta: Policies as flown, shape (n, dim).
-            rewards: Return of each, shape (n,), >= 0, to be maximised.
+            rewards: Return of each, shape (n,), 0 or 1e-30 .. 1e30, to be maximised.
             meta: More about each rollout by name (fields of its outcome, and `LANDED`), each of shape (n, ...);
                 learners may use or ignore it.
 
         Raises:
-            LearnerError: A shape is wrong, a value is not finite, or a return is negative.
+            LearnerError: A shape is wrong, or a value is not finite or out of range; then nothing has changed.
         """
         x, r = _array("theta", theta), _array("rewards", rewards)
         if r.ndim != 1 or x.shape != (r.size, self.dim):
             raise LearnerError(
                 f"tell: theta has shape {x.shape} and rewards {r.shape}, expected (n, {self.dim}) and (n,)"
             )
-        if (r < 0).any():
-            raise LearnerError(f"tell: rewards: value {float(r.min())!r} is negative (allowed 0 .. inf)")
+        self._check_told(x, r)
         extra = {name: np.array(value) for name, value in (meta or {}).items()}
         for name, value in extra.items():
             if value.shape[:1] != r.shape:
@@ -189,6 +192,18 @@ class Learner(ABC):
             self._load(state["search"])
         except (KeyError, TypeError, ValueError) as error:
             raise LearnerError(f"the saved state of {type(self).__name__} is damaged: {error!r}") from error
+
+    def _check_told(self, x: FloatArray, r: FloatArray) -> None:
+        odd = r[(r < 0) | (r > RETURN_MAX) | ((r > 0) & (r < RETURN_MIN))]
+        if odd.size:
+            raise LearnerError(
+                f"tell: rewards: value {float(odd[0])!r} is out of range (allowed 0, {RETURN_MIN:g} .. {RETURN_MAX:g})"
+            )
+        row, column = np.nonzero(np.abs(x - self.mu0) > SPREADS_MAX * self.sigma0)
+        if row.size:
+            raise LearnerError(
+                f"tell: theta: value {float(x[row[0], column[0]])!r} is more than {SPREADS_MAX:g} * sigma0 from mu0"
+            )
 
     def _check_start(self) -> None:
         if self.sigma0.shape != self.mu0.shape:

@@ -20,7 +20,7 @@ against a division by zero, which pulls mu towards zero by a few parts in a mill
 tie the search to the scale of the returns.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -110,3 +110,38 @@ def above_mean(rewards: FloatArray) -> FloatArray:
     if np.ptp(rewards) == 0:  # rounding of the mean must not make weights of equal returns
         return np.zeros(len(rewards))
     return np.asarray(np.maximum(0.0, rewards - rewards.mean()))
+
+
+def imagine(
+    reward: Callable[[FloatArray], FloatArray],
+    mu: FloatArray,
+    sigma: FloatArray,
+    bounds: FloatArray,
+    rng: np.random.Generator,
+    n: int,
+    iterations: int,
+    shrink_min: float,
+    floor: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Where EPHE goes from (mu, sigma), with above-mean weights about the old mean, if rollouts cost nothing.
+
+    Args:
+        reward: Return of policies, shape (n, dim): shape (n,).
+        mu: Centre, shape (dim,).
+        sigma: Spread, shape (dim,).
+        bounds: Box of the policies, shape (dim, 2).
+        rng: Of the policies.
+        n: Policies of an update.
+        iterations: Updates; it ends earlier once all policies have the same return.
+        shrink_min: Share of itself that sigma keeps at least in an update.
+        floor: Smallest sigma, shape (dim,).
+    """
+    lo, hi = bounds.T
+    for _ in range(iterations):
+        theta = draw_truncated(rng, mu, sigma, lo, hi, n)
+        weights = above_mean(reward(theta))
+        if not weights.any():
+            break
+        mean, spread = most_likely(theta, weights, mu)
+        mu, sigma = mean, np.clip(spread, np.maximum(shrink_min * sigma, floor), hi - lo)
+    return mu, sigma

@@ -26,6 +26,7 @@ from ivl.belief.simulator import Simulator
 from ivl.errors import LearnerError
 from ivl.learners.base import LANDED, RECORDING, FloatArray, Meta, draw_truncated
 from ivl.learners.bo import BOOptions
+from ivl.learners.ephe import imagine
 from ivl.learners.ephe_memory import EpheMemory, EpheMemoryOptions
 
 _P_MIN = 0.02
@@ -179,13 +180,9 @@ class EpheBelief(EpheMemory):
         assert self._belief is not None
         options, floor = self.options, self.options.floor * self.sigma0
         starts = [(mu, np.maximum(sigma, 0.5 * self.sigma0)), (self._choice, 0.5 * self.sigma0)]
-        found = [
-            decide.ephe(
-                self._belief, self._corrected, *start, self._bounds, self._rng, options.n_imagined, options.iterations,
-                options.shrink_min, floor,
-            )
-            for start in starts
-        ]  # fmt: skip
+        reward = decide.imagined(self._belief, self._corrected, self._bounds, self._rng)
+        n, updates, shrink = options.n_imagined, options.iterations, options.shrink_min
+        found = [imagine(reward, *start, self._bounds, self._rng, n, updates, shrink, floor) for start in starts]
         rates = decide.margin_rate(self._belief, self._corrected, np.array([mu for mu, _ in found]), self._bounds)
         return found[int(rates.argmax())]
 

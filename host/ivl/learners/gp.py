@@ -29,6 +29,7 @@ _PRIOR_LOG_SD = 1.0  # of each length and of the noise ratio, about their prior 
 _JITTER = 1e-8
 _N_COSINES = 200  # of a prior draw
 _EXPONENT_MIN = -30.0  # no correlation is below 1e-13: products of smaller ones are denormal, a hundred times as slow
+_EXPONENT_MAX = 1e-3  # none is above 0 but by rounding, which far away from the data is large in single precision
 _TINY = 1e-20  # what is less is zero in single precision, for the same reason
 _BLOCK = 40  # largest triangle that is inverted as if it were full
 
@@ -107,7 +108,7 @@ class GaussianProcess:
     def _kernel32(self, x: FloatArray) -> SingleArray:
         """Correlations of x with the data, shape (m, n): the whole exponent is one matrix product."""
         kernel = self._half_exponent(x) @ self._points32
-        np.maximum(kernel, np.float32(_EXPONENT_MIN), out=kernel)
+        np.clip(kernel, np.float32(_EXPONENT_MIN), np.float32(_EXPONENT_MAX), out=kernel)
         return np.asarray(np.exp(kernel, out=kernel))
 
     def _half_exponent(self, x: FloatArray) -> SingleArray:

@@ -6,13 +6,12 @@ recorder before the learners are told.
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from ivl.belief.simulator import Simulator
 from ivl.experiment import Experiment
@@ -23,8 +22,6 @@ from ivl.learning.recorder import PLANNED, SCORED, EpisodeRow, Recorder, Rollout
 from ivl.outcome import RECENT_EPISODES, BoolArray, clean, four_leg
 from ivl.seeds import Purpose, derive
 from ivl.source import Plan, RolloutSource
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -74,16 +71,16 @@ class LearningRun:
             recorder: Keeps what they do.
             simulator: Simulated vehicles, for learners that begin with them.
             earlier: Flights that the learners are told before the first episode.
-            threads: So many learners think at the same time; worth it where each thinks long.
+            threads: So many learners think at the same time, each in a process of its own; worth it where each thinks
+                long.
             begin_anew: The learners have no state yet, whatever the recorder has (`tell_again`).
         """
         self._threads = threads
         self._first, self._source, self._recorder = trials[0], source, recorder
         self._world_seed = np.array([derive(trial.seed, Purpose.WORLD) for trial in trials], dtype=np.uint64)
         self._learners = [trial.make_learner(derive(trial.seed, Purpose.LEARNER)) for trial in trials]
-        for learner in self._learners:
-            if simulator is not None and isinstance(learner, EpheBelief):
-                learner.begin(simulator)
+        if simulator is not None:
+            self._learners = self._each(_begun, [(learner, simulator) for learner in self._learners])
         states = {} if begin_anew else recorder.learner_states()
         for number, learner in enumerate(self._learners):
             if number in states:
@@ -124,7 +121,7 @@ class LearningRun:
         finished = [row.episode for row in self._history if row.trial == trial]
         for episode in finished:
             learner.ask()
-            rows.append(self._learn(episode, self._recorder.rollouts(episode=episode), trial))
+            rows += self._learn(episode, self._recorder.rollouts(episode=episode), [trial])
         if len(self._recorder.rollouts(episode=len(finished)).of_trial(trial)):  # planned, and not told yet
             learner.ask()
         return rows, learner.state_dict()
@@ -141,7 +138,7 @@ class LearningRun:
 
     def _plan(self, episode: int, active: list[int]) -> None:
         n = self._first.n_rollouts
-        theta = self._in_turn(lambda trial: self._learners[trial].ask(), active)
+        theta = [self._learners[trial].ask() for trial in active]
         stream = np.arange(episode * n, (episode + 1) * n, dtype=np.uint64)
         self._recorder.plan(episode, active, stream, theta, self._states(active))
 
@@ -168,26 +165,51 @@ class LearningRun:
             self._n_flown += len(rows)
 
     def _tell(self, episode: int, active: list[int], rollouts: RolloutRows) -> list[EpisodeRow]:
-        rows = self._in_turn(partial(self._learn, episode, rollouts), active)
+        rows = self._learn(episode, rollouts, active)
         self._recorder.finish_episode(rows, self._states(active))
         return rows
 
-    def _learn(self, episode: int, rollouts: RolloutRows, trial: int) -> EpisodeRow:
-        """Tell one learner what counts of an episode of all trials."""
-        own = rollouts.of_rows((rollouts.trial == trial) & (rollouts.status == SCORED))
-        learner = self._learners[trial]
-        learner.tell(own.theta, own.reward, meta_of(own.outcomes, own.recordings))
-        return _episode_row(trial, episode, learner, own.reward, four_leg(own.outcomes), clean(own.outcomes))
+    def _learn(self, episode: int, rollouts: RolloutRows, trials: list[int]) -> list[EpisodeRow]:
+        """Tell the learners of trials what counts of an episode."""
+        own = [rollouts.of_rows((rollouts.trial == trial) & (rollouts.status == SCORED)) for trial in trials]
+        told = [
+            (self._learners[trial], rows.theta, rows.reward, meta_of(rows.outcomes, rows.recordings))
+            for trial, rows in zip(trials, own, strict=True)
+        ]
+        for trial, learner in zip(trials, self._each(_told, told), strict=True):
+            self._learners[trial] = learner
+        return [
+            _episode_row(
+                trial, episode, self._learners[trial], rows.reward, four_leg(rows.outcomes), clean(rows.outcomes)
+            )
+            for trial, rows in zip(trials, own, strict=True)
+        ]
 
-    def _in_turn(self, do: Callable[[int], T], trials: Sequence[int]) -> list[T]:
-        """Let each learner think, in threads if that is worth it; each has random numbers of its own."""
-        if self._threads == 1 or len(trials) == 1:
-            return [do(trial) for trial in trials]
-        with ThreadPoolExecutor(self._threads) as pool:
-            return list(pool.map(do, trials))
+    def _each(self, think: Callable[..., Learner], given: Sequence[tuple[Any, ...]]) -> list[Learner]:
+        """Let each learner think, in processes if that is worth it: a learner goes there and comes back."""
+        if self._threads == 1 or len(given) == 1:
+            return [think(*one) for one in given]
+        from joblib import Parallel, delayed  # type: ignore[import-untyped]  # takes a while to load
+
+        return list(Parallel(n_jobs=self._threads)(delayed(think)(*one) for one in given))
 
     def _states(self, trials: Iterable[int]) -> Iterator[dict[str, Any]]:
         return (self._learners[trial].state_dict() for trial in trials)
+
+
+def _begun(learner: Learner, simulator: Simulator) -> Learner:
+    """A learner that has begun with simulated vehicles, if it can."""
+    with threadpool_limits(1):
+        if isinstance(learner, EpheBelief):
+            learner.begin(simulator)
+    return learner
+
+
+def _told(learner: Learner, theta: FloatArray, rewards: FloatArray, meta: Mapping[str, Any]) -> Learner:
+    """A learner that was told rollouts; by one thread, so that it thinks the same bits alone and beside others."""
+    with threadpool_limits(1):
+        learner.tell(theta, rewards, meta)
+    return learner
 
 
 def recent_rate(history: list[EpisodeRow], trial: int | None = None, clean_only: bool = False) -> float:

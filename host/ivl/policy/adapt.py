@@ -21,6 +21,7 @@ from ivl.belief.bank import Progress
 from ivl.belief.posterior import Evidence, Trust
 from ivl.belief.recording import Flight
 from ivl.belief.simulator import Simulator
+from ivl.learners.ephe import imagine
 from ivl.outcome import Outcomes, four_leg
 from ivl.policy.file import PolicyFile
 from ivl.policy.flying import Place
@@ -167,9 +168,9 @@ class Adaptation:
         """EPHE over imagined flights, and the choice among where it goes and what there is."""
         box = self.flight.box
         sigma = np.maximum(self._sigma, _AGAIN * self._first_sigma)
-        mu, sigma = every.ephe(
-            self._belief, self._form, self._mu, sigma, self._bounds, box, self._rng, _POLICIES, _UPDATES, _SHRINK,
-            _FLOOR * self._first_sigma,
+        mu, sigma = imagine(
+            every.imagined(self._belief, self._form, box, self._rng), self._mu, sigma, self._bounds, self._rng,
+            _POLICIES, _UPDATES, _SHRINK, _FLOOR * self._first_sigma,
         )  # fmt: skip
         candidates = np.array([self._begin[self.general.searched], self._choice, mu])
         rates = every.margin_rate(self._belief, self._form, candidates, box)

@@ -26,6 +26,8 @@ _dask: Any = distributed  # its calls carry no types
 _CONNECT_S = 20.0
 WORKER_BYTES = 350 * 2**20
 """Memory that a worker needs."""
+ADDRESS_SPACE_BYTES = 1900 * 2**20
+"""Address space that each process of a sweep needs; most of it is never used (stacks and heaps of threads)."""
 _FILES, _FILES_PER_WORKER = 64, 24
 """Open files that client and scheduler need, and each worker more."""
 _SETTINGS = {
@@ -99,24 +101,43 @@ def _local(workers: int | None) -> Any:
 
     Raises:
         RolloutError: It cannot be started.
+        ConfigError: It cannot be started, and the memory of a process is limited.
     """
     n = workers or default_workers()
     logger = logging.getLogger("distributed")
     level = logger.level
     logger.setLevel(logging.CRITICAL + 1)  # what goes wrong at the start is said once, below
     try:
-        return _dask.LocalCluster(
+        cluster = _dask.LocalCluster(
             n_workers=n, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
             security=_security(),
         )  # fmt: skip
-    except (RuntimeError, OSError, TimeoutError, MemoryError) as error:
+    except Exception as error:  # Dask ends in a failed assertion, too, where a process cannot be had
         what = " ".join(str(error).split())[:200] or type(error).__name__
-        raise RolloutError(f"{n} workers cannot be started: {what} (try fewer --workers, then --resume)") from error
-    finally:
-        logger.setLevel(level)
+        cannot = f"{n} workers cannot be started: {what}"
+        if _address_space_bytes() != resource.RLIM_INFINITY:
+            raise ConfigError(f"{cannot}: {_limit_text()}, then --resume") from error
+        raise RolloutError(f"{cannot} (try fewer --workers, then --resume)") from error
+    logger.setLevel(level)
+    return cluster
+
+
+def _address_space_bytes() -> int:
+    """What each process may have, workers too."""
+    return resource.getrlimit(resource.RLIMIT_AS)[0]
+
+
+def _limit_text() -> str:
+    allowed, needed = _address_space_bytes(), ADDRESS_SPACE_BYTES
+    return (
+        f"each process may have {allowed / 2**20:.0f} MiB of address space, a sweep needs about "
+        f"{needed / 2**20:.0f} MiB: raise the limit (ulimit -v)"
+    )
 
 
 def _check_limits(n: int) -> None:
+    if 0 <= _address_space_bytes() < ADDRESS_SPACE_BYTES:  # -1: no limit
+        raise ConfigError(f"--workers {n}: {_limit_text()}")
     memory, needed = _memory_bytes(), n * WORKER_BYTES
     if memory < needed:
         fit = memory // WORKER_BYTES
