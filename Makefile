@@ -97,8 +97,8 @@ test-wheel: setup-dev build ## the wheels in fresh environments without compiler
 	@$(BIN)/python tools/test_wheel.py --machine aarch64
 
 .PHONY: example-cpp
-example-cpp: toolchain ## the flight core in a bare C loop and in a C++ module, compiled and flown (docs/PORTING.md)
-	@tools/apt_install.sh g++:g++
+example-cpp: golden-build-O0 ## the flight core in a bare C loop and in a C++ module, compiled and flown (docs/PORTING.md)
+	@tools/apt_install.sh $(CPP)
 	$(say) 'example-cpp: examples'
 	@+$(NATIVE) FLAVOUR=O0 examples
 
@@ -160,7 +160,7 @@ TESTS := setup-dev test-c golden lint test-py pil test-links san test-mutants te
 
 .PHONY: test
 test: ## everything below, set-up and compilers included
-	@tools/apt_install.sh $(TOOLCHAIN) $(CROSS_TOOLCHAIN) $(FUZZER) $(QT_LIBRARIES) $(CHROMIUM) $(OPENSCAD)
+	@tools/apt_install.sh $(TOOLCHAIN) $(CPP) $(CROSS_TOOLCHAIN) $(FUZZER) $(QT_LIBRARIES) $(CHROMIUM) $(OPENSCAD)
 	$(say) 'test: two at a time, each printed when it is over'
 	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 $(TESTS)
 	@+$(MAKE) --no-print-directory test-wire
@@ -350,6 +350,7 @@ setup-dev: $(VENV)/.stamp-dev ## add what tests and lint need to .venv
 
 # what is installed, for tools/apt_install.sh
 TOOLCHAIN       := $(firstword $(CC)):gcc nm:binutils $(CLANG):clang-14
+CPP             := g++:g++
 CROSS_TOOLCHAIN := arm-none-eabi-gcc:gcc-arm-none-eabi qemu-system-arm:qemu-system-arm $(CLANG):clang-14 \
     $$(echo '\#include <string.h>' | arm-none-eabi-gcc -E -x c - > /dev/null 2>&1 || echo :libnewlib-arm-none-eabi)
 FUZZER          := $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)

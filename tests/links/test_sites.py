@@ -1,6 +1,7 @@
 """Where is flown: which site a vehicle gets, and a new one that is a class and a row."""
 
 import json
+import math
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -39,7 +40,7 @@ GOOD = (4.8, 8.0)
 class Hall:
     """A site of these tests: the software vehicle comes by air, nobody is asked, and its own recorder judges."""
 
-    contact_is_seen, is_flown, battery_is_flown = False, True, False
+    contact_is_seen, is_flown = False, True
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         self._vehicle, self._visit = vehicle, visit
@@ -98,6 +99,10 @@ class Hall:
 
     def end_flight(self) -> None:
         pass
+
+    def rotor_V(self, landing: Landing) -> float:
+        del landing
+        return math.nan
 
     def told(self, landing: Landing) -> str:
         return f"hall: {int(landing.outcome['n_legs'][0])} legs"
