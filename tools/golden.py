@@ -139,7 +139,9 @@ def main() -> int:
     """Compare all libraries with the reference; return 0 if every bit is equal."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--update", action="store_true", help="write the reference, if all libraries agree on it")
-    parser.add_argument("--fly", type=int, nargs="+", metavar="THREADS", help="print the lines of the loaded library, then end")
+    parser.add_argument(
+        "--fly", type=int, nargs="+", metavar="THREADS", help="print the lines of the loaded library, then end"
+    )
     parser.add_argument("libraries", nargs="*", type=Path)
     args = parser.parse_args()
     if args.fly is not None:
