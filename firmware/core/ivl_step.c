@@ -90,6 +90,17 @@ static void aim(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_t *seen
     }
 }
 
+// The point to hold.  One far below comes along with the vehicle, so far ahead of it that the errors leave the least lift: with more the vehicle
+// falls, and so little lift does not keep it upright for long.
+static ivl_vec3_t held(const ivl_cfg_t *cfg, const ivl_state_t *state)
+{
+    const float below_m = (1.0f - IVL_LIFT_NORM_MIN) * cfg->mass_kg * cfg->gravity_mps2 / cfg->kp_pos_z_Npm;
+    const float z_m = state->sense.sample.p_WB_m.z - below_m;
+    ivl_vec3_t  p_W_m = state->p_hold_W_m;
+    p_W_m.z = (p_W_m.z < z_m) ? z_m : p_W_m.z;
+    return p_W_m;
+}
+
 // what the tracking controller is to follow
 static ivl_reference_t reference(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, const ivl_seen_t *seen)
 {
@@ -106,7 +117,7 @@ static ivl_reference_t reference(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_d
     {
         return ivl_level_out_next(cfg, state);
     }
-    return (ivl_reference_t){.p_W_m = state->p_hold_W_m};
+    return (ivl_reference_t){.p_W_m = held(cfg, state)};
 }
 
 static void drive(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_drive_t what, const ivl_seen_t *seen, float thrust_N[4])

@@ -1,6 +1,7 @@
 """The one writer of files: what was there stays until the new content is whole and on the disk.
 
 files.write(path, content)          bytes or text
+files.write_new(path, content)      the same, but only where nothing is
 with files.replacing(path) as part: a library writes to `part`, which has the suffix of `path`
 
 A new file has a temporary name of its own, in the same folder, made so that nobody can have put a link there. It is
@@ -15,6 +16,8 @@ import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from ivl.errors import ConfigError
 
 _LEFTOVER = re.compile(r"\.ivl-[0-9a-f]{16}\.part(\.\w+)?")
 _ADVICE = {
@@ -48,6 +51,18 @@ def write(path: Path, content: bytes | str) -> None:
     data = content.encode() if isinstance(content, str) else content
     with replacing(path) as part, part.open("wb") as file:
         file.write(data)
+
+
+def write_new(path: Path, content: bytes | str) -> None:
+    """Write a file of which nothing is there yet.
+
+    Raises:
+        ConfigError: Something of this name is there.
+        OSError: It cannot be written.
+    """
+    if path.exists():
+        raise ConfigError(f"{path}: is there already; choose another name, or remove it")
+    write(path, content)
 
 
 @contextmanager

@@ -66,6 +66,13 @@ static bool put_to_start(ivl_cf_t *cf)
     return ivl_sim_rollout_start(&cf->group, IVL_CF_LANE, &spec);
 }
 
+/// Voltage of the battery that drives the rotors, under their load; 0: a supply that never sags.
+static float rotor_V(ivl_cf_t *cf)
+{
+    const ivl_sim_rotor_t *rotor = &ivl_cf_world(cf)->rotor;
+    return (rotor->open_circuit_V > 0.0) ? (float)ivl_sim_rotor_voltage(&cf->model, rotor) : 0.0f;
+}
+
 void ivl_cf_episode_begin(ivl_cf_t *cf)
 {
     ivl_cf_episode_t *e = &cf->episode;
@@ -80,10 +87,12 @@ void ivl_cf_episode_begin(ivl_cf_t *cf)
     {
         ivl_sim_world_rebase(&cf->group, IVL_CF_LANE);
         cf->zero_us = ivl_cf_time_us(cf);
+        e->battery_V = rotor_V(cf);
     }
     else if (put_to_start(cf))
     {
         cf->zero_us = ivl_cf_time_us(cf);
+        e->battery_V = rotor_V(cf);
         ivl_sim_world_tick(&cf->group, IVL_CF_LANE);
     }
     else

@@ -291,6 +291,7 @@
     LIVE(U32, sil, time_ms,  N, (uint32_t)cf->t_ms) \
     LIVE(U32, sil, episode,  N, cf->episode.number) \
     LIVE(U8,  sil, ended,    N, cf->episode.ended) \
+    LIVE(F32, sil, rotor_V,  N, cf->episode.battery_V) \
     LIVE(U8,  sil, grounded, N, cf->grounded ? 1u : 0u) \
     LIVE(U32, sil, n_pose,   N, cf->estimate.n) \
     LIVE(U32, sil, n_bumps,  N, cf->n_bumps) \

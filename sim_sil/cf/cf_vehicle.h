@@ -110,9 +110,10 @@ typedef struct
     bool                    running;  ///< the last one is not over
     uint8_t                 ended;    ///< it is over and its outcome stands below; a reset clears this
     uint32_t                policy_seq;
-    uint64_t                draws[2];  ///< seed and stream of the last one
-    ivl_sim_outcome_t       now;       ///< of the one that runs
-    ivl_cf_outcome_header_t header;    ///< of the last that has ended
+    uint64_t                draws[2];   ///< seed and stream of the last one
+    float                   battery_V;  ///< of the rotors' battery when the last one began; 0: a supply that never sags
+    ivl_sim_outcome_t       now;        ///< of the one that runs
+    ivl_cf_outcome_header_t header;     ///< of the last that has ended
     ivl_sim_outcome_t       outcome;
 } ivl_cf_episode_t;
 

@@ -138,6 +138,35 @@ static void test_hover_settles_at_the_point_from_a_disturbed_start(void)
     TEST_ASSERT_FLOAT_WITHIN(0.002f, 0.03584f * 9.81f, fix.out.thrust_total_N);
 }
 
+static void test_a_hover_point_far_below_is_descended_to_upright(void)
+{
+    const double below_m[] = {0.2, 0.6, 2.0, 4.0};
+    for (size_t i = 0; i < sizeof below_m / sizeof below_m[0]; i++)
+    {
+        // Given a hover that is pushed
+        body_t b = start_hovering(500.0f, 50.0f);
+        b.p[2] = 1.0 + below_m[i];
+        b.w[0] = 3.0;
+        b.v[0] = 0.2;
+
+        // When the point to hold is far below
+        double fastest_mps = 0.0, tilt_max_rad = 0.0;
+        for (int t = 0; t < 1000; t++)
+        {
+            fly(&b, 0.01);
+            fastest_mps = fmax(fastest_mps, -b.v[2]);
+            tilt_max_rad = (t > 20) ? fmax(tilt_max_rad, tilt_rad(&b)) : 0.0;
+        }
+
+        // Then it comes down no faster than the height loop lets it from where that asks for the least lift, level, and holds there
+        const double ahead_m = 0.8 * (double)(fix.cfg.mass_kg * fix.cfg.gravity_mps2 / fix.cfg.kp_pos_z_Npm);
+        TEST_ASSERT_TRUE(fastest_mps < 1.05 * ahead_m * (double)(fix.cfg.kp_pos_z_Npm / fix.cfg.kd_vel_z_Nspm));
+        TEST_ASSERT_TRUE(tilt_max_rad < 0.2);
+        TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0, b.p[2]);
+        assert_phase(IVL_PHASE_READY, &fix);
+    }
+}
+
 static void fly_approach(float tick_hz, float speed_mps, float angle_deg)
 {
     // Given a hover
@@ -321,6 +350,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_hover_settles_at_the_point_from_a_disturbed_start);
+    RUN_TEST(test_a_hover_point_far_below_is_descended_to_upright);
     RUN_TEST(test_approach_reaches_its_speed_and_stays_level);
     RUN_TEST(test_vehicle_at_speed_holds_it_from_the_first_tick);
     RUN_TEST(test_landing_goes_through_its_phases_once);

@@ -194,7 +194,7 @@ def test_help_teaches_with_examples(words: list[str], capsys: pytest.CaptureFixt
 @pytest.fixture
 def run_folder(truth: Truth, tmp_path: Path) -> Path:
     """A run of two episodes whose recordings were kept."""
-    settings = ["learner.name=ephe_robust", "n_rollouts=4", "budget=8", "check.n_fresh=10", "check.effort=0.05"]
+    settings = ["learner.name=ephe_robust", "n_rollouts=4", "budget=8", "check.n_fresh=10", "check.effort=0.01"]
     settings += [
         "check.grid.rrev_c_per_s={lo: 4.5, hi: 5.0, step: 0.1}",
         "check.grid.moment_y_Nmm={lo: 7.0, hi: 9.0, step: 1.0}",
@@ -236,6 +236,31 @@ def test_run_folder(run_folder: Path, tmp_path: Path) -> None:
     names = [source["file"] for source in found.manifest.source]
     assert names[0] == "run/run.sqlite"
     assert all(name.startswith("run/recordings/") for name in names[1:])
+
+
+def test_run_folder_with_names_of_earlier(run_folder: Path, tmp_path: Path) -> None:
+    imported(run_folder, form="ivl", out=tmp_path / "now")
+    seed = derive(run.read_config(run_folder)[0].seed, Purpose.WORLD)
+    for stream in (0, 5):
+        recordings.path_of(run_folder, seed, stream).rename(run_folder / "recordings" / f"{seed:016x}-{stream}.csv")
+        assert recordings.path_of(run_folder, seed, stream).is_file()
+    imported(run_folder, form="ivl", out=tmp_path / "then")
+    now, then = (flights.read(tmp_path / name) for name in ("now", "then"))
+    assert [f.label for f in then] == ["ep0-run0", "ep0-run2", "ep1-run1"]
+    for a, b in zip(now, then, strict=True):
+        assert str({**a.info, "source": ""}) == str({**b.info, "source": ""})
+    assert not any("no rollout belongs" in note for note in then.manifest.notes)
+
+
+@pytest.mark.parametrize("seed", [0, 0x00F3A5C2B1D4E698, 2**64 - 1])
+@pytest.mark.parametrize("stream", [0, 8, 998, 999, 2**40])
+def test_names_of_recordings_tell_their_rollout(seed: int, stream: int, tmp_path: Path) -> None:
+    path = recordings.path_of(tmp_path, seed, stream)
+    assert recordings.rollout_of(path) == (seed, stream)
+    earlier = path.with_name(f"{seed:016x}-{stream}.csv")
+    assert recordings.rollout_of(earlier) == (seed, stream)
+    for stray in ("stray", path.stem + "x", path.stem.replace("rollout", "trial"), earlier.stem[1:]):
+        assert recordings.rollout_of(path.with_stem(stray)) is None
 
 
 def test_recording_without_a_rollout_is_kept_and_told(run_folder: Path, truth: Truth, tmp_path: Path) -> None:

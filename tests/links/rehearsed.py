@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from ivl import experiment, native, run
+from ivl import experiment, files, native, run
 from ivl.experiment import Experiment
 from ivl.learning.recorder import RolloutRows
 from ivl.links import preflight, sil
@@ -79,7 +79,7 @@ def look_at_truth(patch: pytest.MonkeyPatch, seen: Days) -> None:
 
 def fly_both(folder: Path) -> Days:
     """Forty flights, then the operator goes home; twenty more with a library that was rebuilt over night."""
-    site_file.write_new(folder / "lab.yaml")
+    files.write_new(folder / "lab.yaml", site_file.TEMPLATE.read_bytes())
     chosen = experiment.load("experiments/paper_flight.yaml", SETTINGS, site=str(folder / "lab.yaml"))
     seen = Days(chosen, folder / "run")
     bad_day = scripts.load("default")

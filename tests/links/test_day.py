@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ivl import cli, yamlfile
+from ivl import cli, files, yamlfile
 from ivl.links import preflight
 from ivl.site import file as site_file
 
@@ -20,7 +20,7 @@ GRID = [
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working directory with a site file as `ivl site new` writes it."""
     monkeypatch.chdir(tmp_path)
-    site_file.write_new(tmp_path / "lab.yaml")
+    files.write_new(tmp_path / "lab.yaml", site_file.TEMPLATE.read_bytes())
     return tmp_path
 
 
@@ -72,6 +72,12 @@ def test_a_day_is_rehearsed_stopped_and_resumed(folder: Path, capsys: pytest.Cap
     ]  # fmt: skip
     assert [line.get("n_legs") for line in journal if line["what"] == "flown"] == [4, 3, 0]
     assert len(list((folder / "run" / "recordings").iterdir())) == 3
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_rehearsed_day_has_cameras_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    assert learn([], "--mocap", "simulator") == 2
+    assert "a rehearsed day has cameras of its own: leave --mocap out" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("folder")

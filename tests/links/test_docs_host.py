@@ -19,13 +19,6 @@ def test_deadlines_are_those_of_the_code() -> None:
     assert f"together with {DEADLINES.window - 1} others (`window`)" in TEXT
 
 
-def test_rules_that_discard_a_flight_are_those_of_the_code() -> None:
-    told = re.search(r"An abort by one of the rules ([\w, ]+), or by a request", TEXT)
-    assert told is not None
-    discarding = {name for name, discards in native.library().rules().items() if discards}
-    assert set(told[1].split(", ")) == discarding - {"none"}
-
-
 def test_numbers_of_the_preflight_are_those_of_the_code() -> None:
     for text in (
         f"{preflight.PINGS_MIN} pings: at most {100 * preflight.LOST_MAX:.0f} % lost, 95 % within "

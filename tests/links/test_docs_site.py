@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from ivl import experiment, yamlfile
+from ivl import experiment, files, yamlfile
 from ivl.links import forecast, tracking
 from ivl.links.sites import room
 from ivl.links.trouble import STATES
@@ -24,7 +24,7 @@ def test_states_are_those_of_the_code() -> None:
 
 
 def test_checks_are_those_of_the_code(tmp_path: Path) -> None:
-    site_file.write_new(tmp_path / "lab.yaml")
+    files.write_new(tmp_path / "lab.yaml", site_file.TEMPLATE.read_bytes())
     site = site_file.load(str(tmp_path / "lab.yaml"))
     made = checks.checks(site, experiment.load("experiments/paper_flight.yaml", site=str(tmp_path / "lab.yaml")))
     table = PAGE.partition("## Checks of a site")[2].partition("## ")[0]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rehearsed import BUDGET, FIRST_DAY, Days
 
+from ivl import files
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.learning.earlier import meta_of
@@ -125,10 +126,10 @@ def test_a_script_says_what_happens_and_when() -> None:
 
 def test_a_script_that_is_none_is_refused_in_a_line(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
-    scripts.write_new(path)
+    files.write_new(path, scripts.TEMPLATE.read_bytes())
     assert scripts.load(str(path)) == scripts.load("default")
     with pytest.raises(ConfigError, match="is there already"):
-        scripts.write_new(path)
+        files.write_new(path, scripts.TEMPLATE.read_bytes())
     path.write_text(path.read_text().replace("what: locks", "what: lock"))
     with pytest.raises(ConfigError, match=r"'lock' is unknown.*locks"):
         scripts.load(str(path))

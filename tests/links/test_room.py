@@ -1,5 +1,6 @@
 """The drone's way to fly, rehearsed with a software vehicle: floor, operator, recorder, and the simulator's truth."""
 
+import math
 import struct
 import threading
 import time
@@ -20,10 +21,13 @@ from ivl.links.options import Options
 from ivl.links.packets import Phase, Request
 from ivl.links.sites import room
 from ivl.links.sites.room import Room
+from ivl.links.tables import Session
+from ivl.links.tracking import Tracking
 from ivl.links.trouble import Cause, Trouble, Vetoed
 from ivl.links.truth import Resting
 from ivl.links.vehicle import Command, Supervisor, Vehicle
 from ivl.mocap import config as mocap_config
+from ivl.mocap.frame import FlightFrame
 from ivl.silproc import SilProcess
 from ivl.source import Plan
 from ivl.startpoint import start_point
@@ -386,6 +390,17 @@ def test_lost_camera_before_the_trigger_aborts_and_is_not_scored(
         thread.join()
         assert vehicle.phase == Phase.ABORTED
         server.kill()
+
+
+def test_simulated_cameras_see_the_flight_frame_whatever_the_axes_of_the_site_are(server: SilProcess) -> None:
+    axes = FlightFrame((3.0, -2.0), 1.0)
+    with Session(server.uri) as session:
+        limits = {"rate_hz_min": 1.0, "jitter_ms_max": 1000.0, "settle_s": 0.75}
+        tracking = Tracking(session, mocap_config.load("simulator").model_copy(update=limits), axes)
+        seen = tracking.resting()
+        tracking.close()
+    assert seen is not None
+    assert math.dist(seen.p_W_m[:2], (server.get("simTruth.x"), server.get("simTruth.y"))) < 0.05
 
 
 def test_start_point_leaves_room_for_speed_and_hold(in_room: Experiment) -> None:

@@ -6,11 +6,11 @@ from typing import Any
 
 import policies
 import pytest
-from browsing import DEADLINE_MS
+from looking import Look
 
 import ivl  # isort: split
 
-from playwright.sync_api import Browser, Page, Request, Route
+from playwright.sync_api import Browser
 
 from ivl import cli, experiment, report, run
 from ivl.landing import LandingSpec
@@ -34,7 +34,7 @@ SMALL = {
     "budget": 24,
     "check": {
         "n_fresh": 10,
-        "effort": 0.05,
+        "effort": 0.01,
         "grid": {
             "rrev_c_per_s": {"lo": 4.5, "hi": 5.0, "step": 0.1},
             "moment_y_Nmm": {"lo": 7.0, "hi": 9.0, "step": 1.0},
@@ -96,28 +96,11 @@ def policy_page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return page
 
 
-class Visit:
-    """A page in the browser, with everything that it said and asked for."""
+class Visit(Look):
+    """A look at the page of a file."""
 
     def __init__(self, browser: Browser, path: Path) -> None:
-        self.page: Page = browser.new_page(viewport={"width": 1366, "height": 768})
-        self.page.set_default_timeout(DEADLINE_MS)
-        self.complaints: list[str] = []
-        self.foreign: list[str] = []
-        own = path.resolve().as_uri()
-
-        def gate(route: Route, request: Request) -> None:
-            if request.url == own or request.url.startswith(("data:", "blob:")):
-                route.continue_()
-            else:
-                self.foreign.append(request.url)
-                route.abort()
-
-        self.page.route("**/*", gate)
-        self.page.on("console", lambda m: self.complaints.append(m.text) if m.type == "error" else None)
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.goto(own)
-        self.page.wait_for_selector("body[data-ready=true]", timeout=DEADLINE_MS)
+        super().__init__(browser, path.resolve().as_uri(), also=("data:", "blob:"), width=1366)
 
     def drawn(self, pane: int) -> dict[str, Any]:
         """Where body and feet of a view are on its canvas."""

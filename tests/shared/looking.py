@@ -10,16 +10,19 @@ from playwright.sync_api import Browser, Page, Request, Route
 
 
 class Look:
-    """At the page of a view."""
+    """At one page."""
 
-    def __init__(self, browser: Browser, url: str, token: str = "") -> None:
-        self.page: Page = browser.new_page(viewport={"width": 1400, "height": 900})
+    def __init__(
+        self, browser: Browser, url: str, fragment: str = "", also: tuple[str, ...] = ("data:",), width: int = 1400
+    ) -> None:
+        """Open `url`; other requests than those that begin with it or with one of `also` are refused and kept."""
+        self.page: Page = browser.new_page(viewport={"width": width, "height": 900})
         self.page.set_default_timeout(DEADLINE_MS)
         self.complaints: list[str] = []
         self.foreign: list[str] = []
 
         def gate(route: Route, request: Request) -> None:
-            if request.url.startswith((url, "data:")):
+            if request.url.startswith((url, *also)):
                 route.continue_()
             else:
                 self.foreign.append(request.url)
@@ -28,7 +31,7 @@ class Look:
         self.page.route("**/*", gate)
         self.page.on("console", lambda m: self.complaints.append(m.text) if m.type == "error" else None)
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.goto(f"{url}#{token}")
+        self.page.goto(f"{url}#{fragment}" if fragment else url)
         self.page.wait_for_selector("body[data-ready=true]")
 
     def text(self, name: str) -> str:

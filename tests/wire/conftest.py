@@ -9,14 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from crtp_double import Vehicle
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Tables of contents are kept for these tests alone."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
+from rooms import own_cache as own_cache
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ivl import experiment
+from ivl import experiment, files
 from ivl.cli import console
 from ivl.rehearsal import script as scripts
 from ivl.site import checks
@@ -34,14 +34,14 @@ File = Annotated[Path, typer.Argument(metavar="FILE", help="Site file.")]
 @app.command("new")
 def new(file: File) -> None:
     """Write a commented site file to fill in."""
-    site_file.write_new(file)
+    files.write_new(file, site_file.TEMPLATE.read_bytes())
     console.out.print(f"{file}: measure what it names under not_measured, then: ivl site check {file}")
 
 
 @app.command("script")
 def script(file: Annotated[Path, typer.Argument(metavar="FILE", help="File to write.")]) -> None:
     """Write the script of a rehearsed day, to be changed: what goes wrong, and in which rollout."""
-    scripts.write_new(file)
+    files.write_new(file, scripts.TEMPLATE.read_bytes())
     console.out.print(f"{file}: ivl learn EXPERIMENT --site SITE --rehearse --script {file}")
 
 

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from ivl import links
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.mocap import config as mocap_config
@@ -20,8 +21,10 @@ def tracker(chosen: Experiment, uri: str | None, mocap: str | None, rehearse: bo
     """The tracking system of a flight: as named, else that of a drone's site; a rehearsal has none of its own.
 
     Raises:
-        ConfigError: The site names one already, or the name is none.
+        ConfigError: The site names one already, a rehearsed day has its own, or the name is none.
     """
+    if mocap is not None and uri is not None and uri.startswith(links.REHEARSAL_SCHEME):
+        raise ConfigError(require.OWN_CAMERAS)
     own = site_file.load(chosen.site).mocap if chosen.site and uri and require.is_drone(uri) and not rehearse else None
     if mocap is None:
         return own

@@ -215,7 +215,7 @@ class CrazyflieSource:
             landing.recording.trigger_row,
             landing.outcome,
             threshold_per_s,
-            landing.battery_V if self._site.battery_is_flown else np.nan,
+            self._site.rotor_V(landing),
             self._site.contact_is_seen,
         )
         return features[None]

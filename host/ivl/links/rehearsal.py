@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.links.crazyflie import CrazyflieSource
 from ivl.links.operators import ConsoleOperator
@@ -9,7 +10,7 @@ from ivl.links.options import Options
 from ivl.rehearsal.day import Day
 from ivl.rehearsal.hands import Hands
 from ivl.silproc import SilProcess
-from ivl.site.require import refuse_without_site
+from ivl.site.require import OWN_CAMERAS, refuse_without_site
 
 URI = "rehearsal://"
 
@@ -18,8 +19,14 @@ class RehearsalSource(CrazyflieSource):
     """Flies a software vehicle as if it were a drone; the vehicle is started in the experiment's world, and ended."""
 
     def __init__(self, experiment: Experiment, options: Options | None = None) -> None:
-        """Start the vehicle, and then as `CrazyflieSource`, whose errors it has."""
+        """Start the vehicle, and then as `CrazyflieSource`, whose errors it has.
+
+        Raises:
+            ConfigError: A tracking system is named; the day has cameras of its own.
+        """
         options = replace(options or Options(), rehearse=True)
+        if options.mocap is not None:
+            raise ConfigError(OWN_CAMERAS)
         seed = 0 if options.script is None else options.script.seed
         self.server = SilProcess(experiment.make_world(), seed=seed)
         self.server.start()

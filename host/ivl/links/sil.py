@@ -3,6 +3,7 @@
 The parameters are in group `sil`; a vehicle without it is flown as a drone is.
 """
 
+import math
 import struct
 import zlib
 from dataclasses import dataclass
@@ -49,7 +50,7 @@ class Sil:
         """
         self._vehicle, self._session = vehicle, vehicle.session
         self._draws = b""
-        self._block = LogBlock(("sil.ended",), 20)
+        self._block = LogBlock(("sil.ended", "sil.rotor_V"), 20)
         self._session.start_log(self._block)
         x, y, z = self._session.read(("sil.start_x", "sil.start_y", "sil.start_z")).values()
         self._start_W_m = (x, y, z)
@@ -82,6 +83,11 @@ class Sil:
         """
         self._vehicle.wait(lambda: bool(self._block.values.get("sil.ended")), _ENDED_S, "end of the landing")
         return last_outcome(self._session, policy_seq, self._draws)
+
+    @property
+    def rotor_V(self) -> float:
+        """Voltage of the battery that drives the rotors when the last landing began; NaN: a supply that never sags."""
+        return float(self._block.values.get("sil.rotor_V", 0.0)) or math.nan
 
     def close(self) -> None:
         """Let the next approach begin where the vehicle hovers."""

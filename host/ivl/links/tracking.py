@@ -56,6 +56,7 @@ class Tracking:
         try:
             request: dict[str, Any] | None = None
             if config.system == "simulator":
+                frame = None  # true poses are in the flight frame, whatever the site says of its axes
                 self.room = self._stack.enter_context(SimulatedRoom(session, config.body))
                 session.write({"sil.pose_source": 1})
                 request = self.room.request(config)

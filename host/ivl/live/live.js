@@ -1,7 +1,7 @@
 "use strict";
 // News come as parts; the latest of each is kept in `live`, and drawn when the browser next draws.
 
-const live = { parts: {}, trail: [], seen: 0, frames: 0, drawn: {} };
+const live = { parts: {}, trail: [], seen: 0, frames: 0, drawn: {}, undrawn: true };
 const STALE_S = 1.0, AGAIN_MS = 500;
 const $ = (id) => document.getElementById(id);
 const token = location.hash.slice(1);
@@ -44,11 +44,13 @@ function follow(now) {
     live.trail.push(moment.p_W_m);
     if (live.trail.length > TRAIL_MAX) live.trail.shift();
     live.moment = moment;
+    live.undrawn = true;
   }
 }
 
 const SHOW = {
   room(room) {
+    live.undrawn = true;
     put("experiment", room.site ? `${room.experiment} at ${room.site.name}` : room.experiment);
     document.title = `ivl: ${room.experiment}`;
   },
@@ -205,10 +207,17 @@ $("stop").addEventListener("click", async () => {
 
 // ---- drawing
 
-function draw() {
+// Nothing is drawn twice: the page is often open on the computer that flies.
+function drawNews() {
+  if (!live.undrawn) return;
+  live.undrawn = false;
   live.drawn.side = drawRoom($("side"), live.parts.room, live.moment, live.trail, [0, 2]);
   live.drawn.top = drawRoom($("top"), live.parts.room, live.moment, live.trail, [0, 1]);
   drawClose($("close"), live.parts.room, live.moment);
+}
+
+function draw() {
+  drawNews();
   const age_s = (performance.now() - live.seen) / 1000;
   const over = live.parts.now && /^(over|ended)/.test(live.parts.now.stage);
   banner("stale", age_s < STALE_S ? "" : over ? "The run is over. This is its last news." : `No news for ${age_s.toFixed(0)} s: look at the terminal`);
@@ -216,6 +225,6 @@ function draw() {
   requestAnimationFrame(draw);
 }
 
-window.addEventListener("resize", () => { if (live.parts.learning) showLearning(live.parts.learning); });
+window.addEventListener("resize", () => { live.undrawn = true; if (live.parts.learning) showLearning(live.parts.learning); });
 connect();
 requestAnimationFrame(draw);

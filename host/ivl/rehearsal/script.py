@@ -15,13 +15,15 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
-from ivl import files, yamlfile
+from ivl import yamlfile
 from ivl.errors import ConfigError
 from ivl.links.trouble import Cause
 from ivl.settings import Finite, Strict
 
 FOLDER = Path(__file__).parent
 DEFAULT = "default"
+TEMPLATE = FOLDER / f"{DEFAULT}.yaml"
+"""With comments, to be changed."""
 
 
 class Kind(StrEnum):
@@ -148,15 +150,3 @@ def load(name: str) -> Script:
         shipped = ", ".join(sorted(each.stem for each in FOLDER.glob("*.yaml")))
         raise ConfigError(f"--script {name}: no such file, and no such script (shipped: {shipped})")
     return yamlfile.validate(Script, yamlfile.read(path), path.name)
-
-
-def write_new(path: Path) -> None:
-    """Write the shipped script with its comments, to be changed.
-
-    Raises:
-        ConfigError: Something of this name is there.
-        OSError: It cannot be written.
-    """
-    if path.exists():
-        raise ConfigError(f"{path}: is there already; choose another name, or remove it")
-    files.write(path, (FOLDER / f"{DEFAULT}.yaml").read_bytes())

@@ -15,12 +15,13 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from ivl import files, references, yamlfile
+from ivl import references, yamlfile
 from ivl.errors import ConfigError
 from ivl.mocap.config import MocapConfig
 from ivl.settings import Finite, Name, Strict
 
 TEMPLATE = Path(__file__).parent / "new.yaml"
+"""The commented example, in which everything that must be measured is a placeholder."""
 SIMULATED_TRACKING = ("simulator", "mock")
 """Tracking systems that see no real vehicle."""
 _SPAN_M = 100.0
@@ -172,15 +173,3 @@ def load(path: str) -> SiteFile:
     if isinstance(data, dict):
         references.resolve(data, file.parent)
     return yamlfile.validate(SiteFile, data, file.name)
-
-
-def write_new(path: Path) -> None:
-    """Write the commented example, in which everything that must be measured is a placeholder.
-
-    Raises:
-        ConfigError: Something of this name is there.
-        OSError: It cannot be written.
-    """
-    if path.exists():
-        raise ConfigError(f"{path}: is there already; choose another name, or remove it")
-    files.write(path, TEMPLATE.read_bytes())

@@ -14,6 +14,10 @@ DRONE_SCHEMES = ("radio", "usb", "serial")
 LINK_OF_SITE = "site"
 """What `--uri` says for the link of the site file."""
 HOW = "write a site file with `ivl site new lab.yaml`, measure the room, and add --site lab.yaml"
+OWN_CAMERAS = (
+    "--mocap: a rehearsed day has cameras of its own: leave --mocap out, or fly a vehicle of `ivl sil` that is tracked "
+    "in real time: add --uri udp://HOST:PORT"
+)
 _OF_THE_ROOM = ("measured", "tracking")
 """Checks that say nothing of a rehearsal, which flies in the numbers of the file as they are."""
 

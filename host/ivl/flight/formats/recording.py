@@ -35,6 +35,8 @@ _RULES = (
     Rule("d_ceil_m", "d_ceil_m", nothing=0.0),
     Rule("phase", "phase", needed=True),
 )
+_Rollout = tuple[int, int]
+"""Seed and stream; None is a recording whose name tells no rollout, of which nothing is known."""
 _NEEDED = ["t_s", *(rule.variable for rule in _RULES)]
 _FRAMES = "Those of the flight core, which are those of the schema."
 _CLOCK = "Time of the flight core, from the recorder's first row on."
@@ -81,20 +83,21 @@ def _recordings(folder: Path) -> list[Path]:
 def _run(folder: Path, files: list[Path], given: Given, notes: list[str]) -> list[Flight]:
     known = _database(folder)
     battery_V = _journal(folder / recordings.JOURNAL)
-    for name, info in known.items():
-        if name in battery_V:
-            info["note"] = f"battery {battery_V[name]:.2f} V before take-off"
-    strange = [file.stem for file in files if file.stem not in known]
+    for rollout, info in known.items():
+        if rollout in battery_V:
+            info["note"] = f"battery {battery_V[rollout]:.2f} V before take-off"
+    of = {file: recordings.rollout_of(file) for file in files}
+    strange = [file.stem for file, rollout in of.items() if rollout not in known]
     if strange:
         notes.append(f"{folder}: no rollout belongs to recording {', '.join(strange)}: policy and outcome not known.")
-    order = {name: i for i, name in enumerate(known)}
-    files = sorted(files, key=lambda file: (order.get(file.stem, len(order)), file.stem))
-    return [_flight(file, known.get(file.stem, {"label": file.stem}), given) for file in files]
+    order = {rollout: i for i, rollout in enumerate(known)}
+    files = sorted(files, key=lambda file: (order.get(of[file], len(order)), file.stem))
+    return [_flight(file, known.get(of[file], {"label": file.stem}), given) for file in files]
 
 
-def _database(folder: Path) -> dict[str, dict[str, Any]]:
-    """What was flown and what came of it, by the name of the recording, in the order flown."""
-    result: dict[str, dict[str, Any]] = {}
+def _database(folder: Path) -> dict[_Rollout | None, dict[str, Any]]:
+    """What was flown and what came of it, by rollout, in the order flown."""
+    result: dict[_Rollout | None, dict[str, Any]] = {}
     try:
         experiment, n_trials = run.read_config(folder)
         with RunStore.open_reading(folder, native.library().outcome_dtype) as store:
@@ -110,7 +113,7 @@ def _database(folder: Path) -> dict[str, dict[str, Any]]:
             label = f"ep{rows.episode[i]}-run{rows.idx[i]}"
             label = f"trial{trial}-{label}" if n_trials else label
             told = _rollout(experiment.policy.shape, rows, i)
-            result[recordings.name_of(seed, int(rows.stream[i]))] = {"label": label, **site, **told}
+            result[seed, int(rows.stream[i])] = {"label": label, **site, **told}
     return result
 
 
@@ -128,16 +131,16 @@ def _rollout(form: forms.Form, rows: RolloutRows, i: int) -> dict[str, Any]:
     return {**info, "reward": float(rows.reward[i]), "judged_by": judge}
 
 
-def _journal(path: Path) -> dict[str, float]:
-    """Battery voltage before each take-off, by the name of the recording; what the journal lacks is not known."""
-    result: dict[str, float] = {}
+def _journal(path: Path) -> dict[_Rollout | None, float]:
+    """Battery voltage before each take-off, by rollout; what the journal lacks is not known."""
+    result: dict[_Rollout | None, float] = {}
     if not path.is_file():
         return result
     for number, line in enumerate(border.read_text(path).splitlines(), 1):
         try:
             entry = json.loads(line)
             if entry["what"] == "flown" and entry["battery_V"] is not None:
-                result[recordings.name_of(int(entry["seed"]), int(entry["stream"]))] = float(entry["battery_V"])
+                result[int(entry["seed"]), int(entry["stream"])] = float(entry["battery_V"])
         except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
             raise ConfigError(f"{path}: line {number}: is no entry of a journal") from error
     return result

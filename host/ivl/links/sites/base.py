@@ -55,14 +55,12 @@ class Site(Protocol):
     Attributes:
         contact_is_seen: Whether outcomes there tell when the first leg touched, and not when the accelerometer noticed.
         is_flown: Whether a vehicle flies there whose flights nobody can repeat bit for bit.
-        battery_is_flown: Whether the voltage that the vehicle tells is that of the battery that drives its motors.
 
     Unless a method says otherwise, it may raise LinkError (the link is gone) and RolloutError (not now, and why).
     """
 
     contact_is_seen: bool
     is_flown: bool
-    battery_is_flown: bool
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """The vehicle has been connected, and nothing has been asked of it yet."""
@@ -117,6 +115,10 @@ class Site(Protocol):
 
     def end_flight(self) -> None:
         """The flight is over, however it ended; must not raise, and may come twice."""
+        ...
+
+    def rotor_V(self, landing: Landing) -> float:
+        """Voltage of the battery that drives the motors, in the hover before the approach; NaN: nobody knows."""
         ...
 
     def told(self, landing: Landing) -> str:

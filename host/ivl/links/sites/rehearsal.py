@@ -4,9 +4,11 @@ Without a day (`ivl.rehearsal`) nothing goes wrong, and the simulator's truth is
 follow the vehicle, its battery drives the motors, and the vehicle is brought back by the hands of an operator.
 """
 
+import math
+
 from ivl.links import sil
 from ivl.links.clock import FINE, Clock, LockStep, WallClock
-from ivl.links.landing_flight import Rollout
+from ivl.links.landing_flight import Landing, Rollout
 from ivl.links.options import Options
 from ivl.links.sites.base import Visit
 from ivl.links.sites.room import Room
@@ -17,9 +19,7 @@ from ivl.rehearsal.cameras import Cameras, Watched
 
 
 class Rehearsal(Room):
-    """A room in which the software vehicle is flown as if it were a drone; of its voltage see `Simulator`."""
-
-    battery_is_flown = False
+    """A room in which the software vehicle is flown as if it were a drone."""
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """As the base; on a rehearsed day cameras follow the vehicle, unless others do."""
@@ -31,7 +31,6 @@ class Rehearsal(Room):
             cameras.watch_over(vehicle)
             self._tracking = cameras
             self._day.meets(vehicle, cameras)
-            self.battery_is_flown = True
 
     @staticmethod
     def suits(session: Session, options: Options) -> bool:
@@ -71,6 +70,10 @@ class Rehearsal(Room):
         super().before_approach(rollout)
         if self._day is not None:
             self._day.hovers()
+
+    def rotor_V(self, landing: Landing) -> float:
+        """As the base on a rehearsed day; else the battery that a software vehicle tells of drives no motors."""
+        return math.nan if self._day is None else super().rotor_V(landing)
 
     def end_flight(self) -> None:
         """As the base; the battery has less."""

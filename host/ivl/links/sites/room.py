@@ -51,7 +51,7 @@ _SETTLE_S, _IDLE_S, _ARM_S, _END_S = 1.0, 3.0, 8.0, 30.0
 class Room:
     """A site where nobody knows more than recorder, cameras and operator see."""
 
-    contact_is_seen, is_flown, battery_is_flown = False, True, True
+    contact_is_seen, is_flown = False, True
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """Any vehicle.
@@ -287,6 +287,10 @@ class Room:
             self._say(f"judged by tracking: {suggested.n_legs} legs{f' ({note})' if note else ''}")
             return suggested
         return self._operator.confirm(suggested, resting, note)
+
+    def rotor_V(self, landing: Landing) -> float:
+        """What its power management tells: a drone has one battery."""
+        return landing.battery_V
 
     def told(self, landing: Landing) -> str:
         """How it ended, as the operator has confirmed it, and the battery that the landing began with."""

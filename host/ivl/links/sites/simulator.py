@@ -24,12 +24,9 @@ class OtherWorld(FlyingEnds):
 
 
 class Simulator:
-    """A site where everything is known, and where a landing has the bits that it has in this process.
+    """A site where everything is known, and where a landing has the bits that it has in this process."""
 
-    The voltage that a software vehicle tells is that of its power management, and not of the world's battery.
-    """
-
-    contact_is_seen, is_flown, battery_is_flown = True, False, False
+    contact_is_seen, is_flown = True, False
 
     def __init__(self, vehicle: Vehicle, visit: Visit) -> None:
         """The vehicle must be a software vehicle."""
@@ -128,6 +125,11 @@ class Simulator:
 
     def end_flight(self) -> None:
         """Do nothing."""
+
+    def rotor_V(self, landing: Landing) -> float:
+        """That of the world's battery, which is another one than that of the vehicle's power management."""
+        del landing
+        return self._extras.rotor_V
 
     def told(self, landing: Landing) -> str:
         """Say nothing: it would be many lines a second."""
