@@ -153,7 +153,10 @@ def table(hostile: Total, played: dict[str, Total]) -> str:
         "UndefinedBehaviorSanitizer.\n\n| what | tried | of the vehicle | broken |\n|---|---|---|---|\n"
     )
     rows = [row(f"sequences of {kind.text}", played[kind.name]) for kind in KINDS]
-    return head + row("packets, guided by coverage, to the software vehicle", hostile) + "".join(rows)
+    first = (
+        row("packets, guided by coverage, to the software vehicle", hostile) if hostile.tried or hostile.broken else ""
+    )
+    return head + first + "".join(rows)
 
 
 def main() -> int:
@@ -166,7 +169,7 @@ def main() -> int:
     arguments = parser.parse_args()
     played = {}
     for kind in KINDS:
-        number = max(round(getattr(arguments, kind.name) * arguments.scale), 50)
+        number = round(getattr(arguments, kind.name) * arguments.scale)
         played[kind.name] = sequences(kind, number)
     hostile = packets(round(arguments.packets * arguments.scale))
     text = table(hostile, played)

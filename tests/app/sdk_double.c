@@ -244,7 +244,7 @@ logVarId_t logGetVarId(const char *group, const char *name)
 float logGetFloat(logVarId_t varid)
 {
     TEST_ASSERT_TRUE((varid >= 'X') && (varid <= 'Z'));
-    return (varid == (logVarId_t)sdk.certain_axis) ? 1.0e-12f : sdk.variance_m2;
+    return ((sdk.vague_axis == 0) || (varid == (logVarId_t)sdk.vague_axis)) ? sdk.variance_m2 : 1.0e-12f;
 }
 
 float rangeGet(rangeDirection_t direction)

@@ -33,8 +33,8 @@ typedef struct
     bool         controller_runs;  ///< false: another controller is selected
     float        variance_m2;
     bool         has_variance;
-    char         certain_axis;  ///< 'X', 'Y' or 'Z': its variance is next to nothing; 0: of none
-    float        range_up_mm;   ///< 0: no such sensor
+    char         vague_axis;   ///< 'X', 'Y' or 'Z': the others have a variance of next to nothing; 0: all have the same
+    float        range_up_mm;  ///< 0: no such sensor
     unsigned int motor_power_set;
     unsigned int idle_thrust;  ///< powerDist.idleThrust
     bool         has_no_idle;  ///< there is no such parameter

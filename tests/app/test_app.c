@@ -1001,7 +1001,7 @@ static void test_the_position_is_as_uncertain_as_its_least_certain_axis(void)
     for (char axis = 'X'; axis <= 'Z'; axis++)
     {
         sdk.variance_m2 = 0.04f;
-        sdk.certain_axis = axis;
+        sdk.vague_axis = axis;
         app_task_once();
         TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.2f, atomic_load(&ivl_app.p_sigma_m));
     }
@@ -1009,7 +1009,7 @@ static void test_the_position_is_as_uncertain_as_its_least_certain_axis(void)
     {
         // one that is no number is seen
         sdk.variance_m2 = NAN;
-        sdk.certain_axis = axis;
+        sdk.vague_axis = axis;
         app_task_once();
         TEST_ASSERT_TRUE(isnan(atomic_load(&ivl_app.p_sigma_m)));
     }
