@@ -85,8 +85,8 @@ class Operator(Protocol):
         """Return when the battery has been changed."""
         ...
 
-    def help(self, cause: Cause, text: str) -> None:
-        """Return when what the state of this cause asks for has been done."""
+    def help(self, cause: Cause) -> None:
+        """Return when what the state of this cause asks for has been done; what has happened was told before."""
         ...
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
@@ -216,11 +216,9 @@ class ConsoleOperator:
         self._tell(f"BATTERY: {battery_V:.2f} V, needed {needed_V:.2f} V; the same policy is next.")
         self._ask(f"{state_of(Cause.BATTERY).asks}, then", ["changed"])
 
-    def help(self, cause: Cause, text: str) -> None:
-        """Tell, and ask."""
-        state = state_of(cause)
-        self._tell(f"{cause.upper()}: {text}")
-        self._ask(f"{state.asks}, then", ["go on"])
+    def help(self, cause: Cause) -> None:
+        """Ask."""
+        self._ask(f"{cause.upper()}: {state_of(cause).asks}, then", ["go on"])
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
         """Ask for legs and body contact; what the pose suggests is shown."""
