@@ -138,7 +138,7 @@ def test_each_state_asks_for_what_its_row_says(state: object) -> None:
     cause = state.cause  # type: ignore[attr-defined]
     asked, told = operator("go", "go on")
     asked.help(cause)
-    assert f"{cause.upper()}: {state_of(cause).asks}, then [go on | stop]: " in told.getvalue()
+    assert f"{cause.upper()}: {state_of(cause).asks}, then" in told.getvalue()
     assert told.getvalue().count("not understood") == 1
 
 
