@@ -198,10 +198,8 @@ class ConsoleOperator:
         """Show the flight, ask, then count down."""
         theta = upcoming.form.describe(upcoming.theta)
         self._tell(f"NEXT: rollout {upcoming.number} of {upcoming.n_all}: {theta}; {upcoming.forecast}.")
-        self._tell(
-            "Vehicle upright at home ({:.2f}, {:.2f}) m; ".format(*upcoming.home_W_m)
-            + "it will hover at ({:.2f}, {:.2f}, {:.2f}) m. Everybody outside, net closed.".format(*upcoming.start_W_m)
-        )
+        home, start = (", ".join(f"{v:z.2f}" for v in place) for place in (upcoming.home_W_m, upcoming.start_W_m))
+        self._tell(f"Vehicle upright at home ({home}) m; it will hover at ({start}) m. Everybody outside, net closed.")
         answer = self._ask("arm and fly?", [f"fly {upcoming.number}", "veto", "instead"])
         if answer == "veto":
             raise Vetoed("vetoed by the operator")
