@@ -2,7 +2,7 @@
 #
 # This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
 # Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS, VEHICLE, GEAR, SIL_ARGS,
-# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS.
+# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS, WHEEL_ARGS.
 
 PYTHON     ?= python3
 CLANG      ?= clang-14
@@ -15,6 +15,8 @@ ifeq ($(origin CC),default)
 CC := $(if $(shell command -v gcc),gcc,cc)
 endif
 export CC CLANG
+# every program of the tests loads the package: it is compiled once, not by each of them
+unexport PYTHONDONTWRITEBYTECODE
 
 VENV   := .venv
 BIN    := $(VENV)/bin
@@ -29,7 +31,8 @@ APP     = $(SUBMAKE) -f tools/app.mk
 say     = @printf '==> %s\n'
 # what is no test of pytest or Unity, both of which end a test that does not, ends after this
 within  = timeout --verbose --kill-after=10 3600
-pip     = $(BIN)/python -m pip --disable-pip-version-check install --quiet --constraint tools/constraints.txt
+# most of what is installed is never loaded: Python compiles what is
+pip     = $(BIN)/python -m pip --disable-pip-version-check install --quiet --no-compile --constraint tools/constraints.txt
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -76,6 +79,29 @@ cad: setup build openscad ## legs and jigs to print, as STL in build/cad (CAD_AR
 	$(say) 'cad: models of cad/ with the numbers of the gear file'
 	@$(BIN)/python tools/cad.py $(CAD_ARGS)
 
+##@ To give away
+
+.PHONY: wheel
+wheel: setup-dev toolchain ## wheels in build/wheels that need no compiler: for this processor, and for aarch64
+	@tools/apt_install.sh aarch64-linux-gnu-gcc:gcc-aarch64-linux-gnu :libc6-dev-arm64-cross
+	$(say) 'wheel: compiling and packing'
+	@JOBS=$(JOBS) $(BIN)/python tools/wheel.py
+	@JOBS=$(JOBS) $(BIN)/python tools/wheel.py --machine aarch64
+
+.PHONY: test-wheel
+test-wheel: setup-dev build ## the wheels in fresh environments without compiler and repository; aarch64 under qemu-user (WHEEL_ARGS='--python python3.13')
+	@tools/apt_install.sh aarch64-linux-gnu-gcc:gcc-aarch64-linux-gnu :libc6-dev-arm64-cross qemu-aarch64:qemu-user
+	$(say) 'test-wheel: installed, and used'
+	@$(BIN)/python tools/test_wheel.py $(WHEEL_ARGS)
+	$(say) 'test-wheel: aarch64, emulated'
+	@$(BIN)/python tools/test_wheel.py --machine aarch64
+
+.PHONY: example-cpp
+example-cpp: golden-build-O0 ## the flight core in a bare C loop and in a C++ module, compiled and flown (docs/PORTING.md)
+	@tools/apt_install.sh $(CPP)
+	$(say) 'example-cpp: examples'
+	@+$(NATIVE) FLAVOUR=O0 examples
+
 ##@ The vehicle's processor
 
 .PHONY: firmware
@@ -99,7 +125,7 @@ pil: setup-dev build firmware $(STM32:%=pil-unity-%) ## unit tests, replay and l
 	@$(BIN)/python -m pytest tests/stm32 $(PYTEST_ARGS)
 
 .PHONY: $(STM32:%=pil-unity-%)
-$(STM32:%=pil-unity-%): pil-unity-%: cross-toolchain $(UNITY)/unity.c
+$(STM32:%=pil-unity-%): pil-unity-%: firmware-% $(UNITY)/unity.c
 	$(say) 'pil: C tests on the emulated chip ($*)'
 	@+$(CROSS) FLAVOUR=$* check
 
@@ -127,18 +153,21 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 
 ##@ Tests
 
-# longest first; some mostly compute, some mostly wait; test-wire flies in real time and has the machine for itself
-SLOW_TESTS := test-py pil test-links test-mutants test-mujoco test-sil test-sweep test-report test-forms test-analysis test-flight test-physics sizes-diff
+# Two at a time: the first compile while pip waits for its downloads, then the longest come first.  Stages that compile into one folder are
+# ordered by their prerequisites.  test-wire flies in real time and has the machine for itself.
+TESTS := setup-dev test-c golden lint test-py pil test-links san test-mutants test-mujoco test-sil test-sweep test-report test-forms test-analysis \
+         test-flight test-physics sizes-diff
 
 .PHONY: test
-test: setup-dev toolchain cross-toolchain chromium qt-libraries lint test-c san golden ## everything below, set-up and compilers included
-	$(say) 'test: the rest, two at a time, each printed when it is over'
-	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 $(SLOW_TESTS)
+test: ## everything below, set-up and compilers included
+	@tools/apt_install.sh $(TOOLCHAIN) $(CPP) $(CROSS_TOOLCHAIN) $(FUZZER) $(QT_LIBRARIES) $(CHROMIUM) $(OPENSCAD)
+	$(say) 'test: two at a time, each printed when it is over'
+	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 $(TESTS)
 	@+$(MAKE) --no-print-directory test-wire
 	$(say) 'test: everything passed'
 
 .PHONY: test-c
-test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator (Unity)
+test-c: toolchain build $(UNITY)/unity.c example-cpp ## unit tests of firmware core and simulator (Unity), and the examples in C and C++
 	$(say) 'test-c: C tests, strict warnings as errors'
 	@+$(NATIVE) FLAVOUR=release check
 	$(say) 'test-c: Crazyflie app on a stand-in for its SDK, ASan and UBSan'
@@ -146,10 +175,15 @@ test-c: toolchain $(UNITY)/unity.c ## unit tests of firmware core and simulator 
 	$(say) 'test-c: random sequences of events for the app'
 	@+$(APP) sequences
 
+.PHONY: san-build
+san-build: toolchain
+	$(say) 'san: compiling with ASan and UBSan'
+	@+$(NATIVE) FLAVOUR=san lib sil
+
 .PHONY: san
-san: toolchain setup-dev $(UNITY)/unity.c ## the same C tests, and landings, under AddressSanitizer and UndefinedBehaviorSanitizer
+san: san-build setup-dev $(UNITY)/unity.c ## the same C tests, and landings, under AddressSanitizer and UndefinedBehaviorSanitizer
 	$(say) 'san: C tests under ASan and UBSan'
-	@+$(NATIVE) FLAVOUR=san check lib
+	@+$(NATIVE) FLAVOUR=san check
 	$(say) 'san: random sequences for the server of the software vehicle'
 	@+$(NATIVE) FLAVOUR=san sequences
 	$(say) 'san: landings under ASan and UBSan'
@@ -157,17 +191,17 @@ san: toolchain setup-dev $(UNITY)/unity.c ## the same C tests, and landings, und
 	    $(BIN)/python -m pytest -p no:cacheprovider -m 'not slow' tests/physics $(PYTEST_ARGS)
 
 .PHONY: golden
-golden: setup $(GOLDEN:%=golden-build-%) ## same bits from gcc and clang, -O0 and -O3, any registers, one thread or many
+golden: setup-dev $(GOLDEN:%=golden-build-%) ## same bits from gcc and clang, -O0 and -O3, any registers, one thread or many
 	$(say) 'golden: hashes of reference landings'
 	@$(within) $(BIN)/python tools/golden.py $(GOLDEN:%=build/%/libivl_sil.so)
 
 .PHONY: golden-update
-golden-update: setup $(GOLDEN:%=golden-build-%) ## accept the present hashes as the reference (in its own commit, with the reason)
+golden-update: setup-dev $(GOLDEN:%=golden-build-%) ## accept the present hashes as the reference (in its own commit, with the reason)
 	$(say) 'golden-update: tests/golden/landings.txt'
 	@$(BIN)/python tools/golden.py --update $(GOLDEN:%=build/%/libivl_sil.so)
 
 .PHONY: $(GOLDEN:%=golden-build-%)
-$(GOLDEN:%=golden-build-%): golden-build-%: toolchain
+$(GOLDEN:%=golden-build-%): golden-build-%: toolchain build
 	$(say) 'golden: compiling $*'
 	@+$(NATIVE) FLAVOUR=$* lib
 
@@ -182,16 +216,15 @@ test-flight: setup-dev build ## recorded flights: every form of log there and ba
 	@$(BIN)/python -m pytest tests/flight $(PYTEST_ARGS)
 
 .PHONY: test-sil
-test-sil: setup-dev build toolchain qt-libraries ## the software vehicle with unmodified cflib, and a short fuzz of its packets
-	@+$(NATIVE) FLAVOUR=san sil
-	@tools/apt_install.sh $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
+test-sil: setup-dev build san-build qt-libraries ## the software vehicle with unmodified cflib, and a short fuzz of its packets
+	@tools/apt_install.sh $(FUZZER)
 	@+$(NATIVE) FLAVOUR=fuzz fuzz
 	$(say) 'test-sil: pytest tests/sil'
 	@$(BIN)/python -m pytest tests/sil $(PYTEST_ARGS)
 
 .PHONY: fuzz
 fuzz: toolchain setup build ## fuzz the packets of the software vehicle (FUZZ_RUNS=5000000 inputs; FUZZ_ARGS for libFuzzer)
-	@tools/apt_install.sh $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
+	@tools/apt_install.sh $(FUZZER)
 	@+$(NATIVE) FLAVOUR=fuzz fuzz
 	$(say) 'fuzz: $(FUZZ_RUNS) inputs; new ones are kept in build/fuzz/corpus'
 	@tools/fuzz.sh build/fuzz/fuzz_crtp $(FUZZ_RUNS) $(FUZZ_ARGS)
@@ -207,7 +240,7 @@ mutants: setup-dev build toolchain $(UNITY)/unity.c ## small faults put into the
 	@$(BIN)/python tools/mutants.py $(MUTANTS_ARGS)
 
 .PHONY: test-mutants
-test-mutants: setup-dev build toolchain $(UNITY)/unity.c ## a few of these faults, each of which must be found
+test-mutants: setup-dev test-c ## a few of these faults, each of which must be found
 	$(say) 'test-mutants: a few small faults'
 	@$(within) $(BIN)/python tools/mutants.py --only wire --only mocap --scale 0.07
 
@@ -220,7 +253,7 @@ sequences: toolchain $(UNITY)/unity.c ## random sequences for the app, and for t
 reliability: setup-dev build toolchain $(UNITY)/unity.c ## damaged files, failing disks, hostile packets, links that lose and restart; writes docs/RELIABILITY.md (an hour)
 	@+$(APP) build/app/sequences
 	@+$(NATIVE) FLAVOUR=san build/san/loop_sequences
-	@tools/apt_install.sh $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
+	@tools/apt_install.sh $(FUZZER)
 	@+$(NATIVE) FLAVOUR=fuzz fuzz
 	@$(BIN)/python tools/packets.py
 	@mkdir -p build/borders
@@ -234,7 +267,7 @@ FORMS_TESTS    := test_ivl_policy test_ivl_parts test_ivl_wire test_ivl_fuzz
 FORMS_ON_STM32 := test_ivl_policy test_ivl_parts
 
 .PHONY: test-forms
-test-forms: setup-dev build toolchain cross-toolchain $(UNITY)/unity.c ## forms of a policy that no product file knows: learned, swept, reported, flown everywhere
+test-forms: setup-dev test-c firmware pil-unity-stm32-Os ## forms of a policy that no product file knows: learned, swept, reported, flown everywhere
 	$(say) 'test-forms: library, software vehicle, image and app with the forms of tests/forms, and their C tests'
 	@+$(NATIVE) FORMS=tests/forms lib sil $(FORMS_TESTS:%=run-%)
 	@+$(CROSS) FORMS=tests/forms build/stm32-Os-tests-forms/tick_server.elf $(FORMS_ON_STM32:%=run-%)
@@ -281,7 +314,7 @@ test-analysis: setup-dev build ## analysis and figures of campaigns, on tables w
 	@$(BIN)/python -m pytest tests/analysis $(PYTEST_ARGS)
 
 .PHONY: lint
-lint: setup-dev toolchain ## formatting, types, rules of the firmware core, equation references
+lint: setup-dev build golden-build-O0 ## formatting, types, rules of the firmware core, equation references
 	$(say) 'lint: ruff'
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
@@ -290,8 +323,6 @@ lint: setup-dev toolchain ## formatting, types, rules of the firmware core, equa
 	$(say) 'lint: clang-format'
 	@$(BIN)/clang-format --dry-run -Werror $(C_FILES) < /dev/null
 	$(say) 'lint: rules of the firmware core'
-	@+$(NATIVE) FLAVOUR=O0 core
-	@+$(NATIVE) FLAVOUR=release core
 	@tools/check_core.sh build/O0/firmware/core build/release/firmware/core
 	$(say) 'lint: equation references'
 	@$(BIN)/python tools/check_refs.py
@@ -317,28 +348,36 @@ bench: setup-dev build firmware ## rollouts and steps per second per core, ratio
 .PHONY: setup-dev
 setup-dev: $(VENV)/.stamp-dev ## add what tests and lint need to .venv
 
+# what is installed, for tools/apt_install.sh
+TOOLCHAIN       := $(firstword $(CC)):gcc nm:binutils $(CLANG):clang-14
+CPP             := g++:g++
+CROSS_TOOLCHAIN := arm-none-eabi-gcc:gcc-arm-none-eabi qemu-system-arm:qemu-system-arm $(CLANG):clang-14 \
+    $$(echo '\#include <string.h>' | arm-none-eabi-gcc -E -x c - > /dev/null 2>&1 || echo :libnewlib-arm-none-eabi)
+FUZZER          := $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
+CHROMIUM        := chromium:chromium
+OPENSCAD        := openscad:openscad
+QT_LIBRARIES    := libdbus-1.so.3:libdbus-1-3 libEGL.so.1:libegl1 libfontconfig.so.1:libfontconfig1 libGL.so.1:libgl1 \
+    libglib-2.0.so.0:libglib2.0-0 libxkbcommon.so.0:libxkbcommon0
+
 .PHONY: toolchain
 toolchain: ## install the compilers that the tests need (Debian; needs root only if one is missing)
-	@tools/apt_install.sh $(firstword $(CC)):gcc nm:binutils $(CLANG):clang-14
+	@tools/apt_install.sh $(TOOLCHAIN)
 
 .PHONY: cross-toolchain
 cross-toolchain: ## install what compiles for the vehicle and emulates it (Debian; needs root only if something is missing)
-	@tools/apt_install.sh arm-none-eabi-gcc:gcc-arm-none-eabi \
-	    $$(echo '#include <string.h>' | arm-none-eabi-gcc -E -x c - > /dev/null 2>&1 || echo :libnewlib-arm-none-eabi) \
-	    qemu-system-arm:qemu-system-arm $(CLANG):clang-14
+	@tools/apt_install.sh $(CROSS_TOOLCHAIN)
 
 .PHONY: chromium
 chromium: ## install the browser that the reports are tested in (Debian; needs root only if it is missing)
-	@tools/apt_install.sh chromium:chromium
+	@tools/apt_install.sh $(CHROMIUM)
 
 .PHONY: openscad
 openscad: ## install the program that makes the printable models (Debian; needs root only if it is missing)
-	@tools/apt_install.sh openscad:openscad
+	@tools/apt_install.sh $(OPENSCAD)
 
 .PHONY: qt-libraries
-qt-libraries: setup-dev ## install what cfclient's windows are drawn with (Debian; needs root only if something is missing)
-	@$(BIN)/python -c 'import PyQt6.QtOpenGLWidgets' 2> /dev/null || tools/apt_install.sh \
-	    :libdbus-1-3 :libegl1 :libfontconfig1 :libgl1 :libglib2.0-0 :libxkbcommon0
+qt-libraries: ## install what cfclient's windows are drawn with (Debian; needs root only if something is missing)
+	@tools/apt_install.sh $(QT_LIBRARIES)
 
 .PHONY: clean
 clean: ## remove what was compiled
@@ -350,7 +389,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
 
 # set-up, each step once
 
@@ -363,10 +402,11 @@ $(VENV)/.stamp-run: $(BIN)/python pyproject.toml tools/constraints.txt
 	@$(pip) --editable '.[link,sweep,report,live]'
 	@touch $@
 
-$(VENV)/.stamp-dev: $(VENV)/.stamp-run
-	$(say) 'setup: installing what tests and lint need'
-	@$(pip) --editable '.[link,sweep,report,live,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
-	@touch $@
+# what is needed to run is a part of it, and is not installed twice
+$(VENV)/.stamp-dev: $(BIN)/python pyproject.toml tools/constraints.txt
+	$(say) 'setup: installing ivl and what it, its tests and lint need'
+	@$(pip) --editable '.[link,sweep,report,live,gym,optimisers,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
+	@touch $(VENV)/.stamp-run $@
 
 $(UNITY)/unity.c: tools/get_unity.sh tools/unity.txt | $(BIN)/python
 	$(say) 'setup: installing Unity, the C test framework'

@@ -204,6 +204,7 @@ typedef struct
     const ivl_sim_model_t *model;
     const ivl_sim_spec_t  *specs;
     ivl_sim_outcome_t     *outcomes;
+    ivl_sim_tracer_t      *tracers;  ///< NULL: nothing is recorded
     size_t                 n;
     atomic_size_t          next;
     atomic_ullong          offered, used;  // evaluations: see ivl_sim_work_t
@@ -217,7 +218,7 @@ static bool next_of_batch(void *context, ivl_sim_job_t *job)
     {
         return false;
     }
-    *job = (ivl_sim_job_t){&batch->specs[i], &batch->outcomes[i], NULL};
+    *job = (ivl_sim_job_t){&batch->specs[i], &batch->outcomes[i], (batch->tracers == NULL) ? NULL : &batch->tracers[i]};
     return true;
 }
 
@@ -238,29 +239,56 @@ static int thread_count(int asked, size_t n)
     return ((size_t)threads > groups) ? (int)((groups > 0) ? groups : 1) : (int)threads;
 }
 
-int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes, uint64_t work[2])
+static void fly_all(batch_t *batch, int n_threads)
 {
-    batch_t   batch = {.model = model, .specs = specs, .outcomes = outcomes, .n = n};
     pthread_t thread[THREADS_MAX];
-    atomic_init(&batch.next, 0);
-    atomic_init(&batch.offered, 0);
-    atomic_init(&batch.used, 0);
-    const int extra = thread_count(n_threads, n) - 1;
+    atomic_init(&batch->next, 0);
+    atomic_init(&batch->offered, 0);
+    atomic_init(&batch->used, 0);
+    const int extra = thread_count(n_threads, batch->n) - 1;
     int       started = 0;
-    while (started < extra && pthread_create(&thread[started], NULL, fly_batch, &batch) == 0)
+    while (started < extra && pthread_create(&thread[started], NULL, fly_batch, batch) == 0)
     {
         started++;
     }
-    fly_batch(&batch);  // this thread works too, so that a lack of others only costs time
+    fly_batch(batch);  // this thread works too, so that a lack of others only costs time
     for (int i = 0; i < started; i++)
     {
         pthread_join(thread[i], NULL);
     }
+}
+
+int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threads, void *outcomes, uint64_t work[2])
+{
+    batch_t batch = {.model = model, .specs = specs, .outcomes = outcomes, .n = n};
+    fly_all(&batch, n_threads);
     if (work != NULL)
     {
         work[0] = atomic_load(&batch.offered);
         work[1] = atomic_load(&batch.used);
     }
+    return 0;
+}
+
+int ivl_sil_traces(const void *model, const void *specs, size_t n, int n_threads, double period_s, void *rows, size_t capacity,
+                   uint64_t *n_rows, void *outcomes)
+{
+    ivl_sim_tracer_t *tracers = (period_s > 0.0 && n > 0) ? calloc(n, sizeof *tracers) : NULL;
+    if (tracers == NULL)
+    {
+        return (n == 0) ? 0 : -1;
+    }
+    for (size_t i = 0; i < n; i++)
+    {
+        tracers[i] = (ivl_sim_tracer_t){.period_s = period_s, .rows = (ivl_sim_trace_t *)rows + i * capacity, .capacity = capacity};
+    }
+    batch_t batch = {.model = model, .specs = specs, .outcomes = outcomes, .tracers = tracers, .n = n};
+    fly_all(&batch, n_threads);
+    for (size_t i = 0; i < n; i++)
+    {
+        n_rows[i] = tracers[i].n;
+    }
+    free(tracers);
     return 0;
 }
 

@@ -69,6 +69,12 @@ int ivl_sil_rollouts(const void *model, const void *specs, size_t n, int n_threa
 /// @return rows that the landing has; -1 if the period is not positive
 long ivl_sil_trace(const void *model, const void *spec, double period_s, void *rows, size_t capacity, void *outcome);
 
+/// Flies n landings as ivl_sil_rollouts, each with its time series: `capacity` rows a landing in `rows`.
+/// @param[out] n_rows  rows that each landing has; those beyond the capacity are counted, not written
+/// @return 0; -1 if the period is not positive, or there is no memory
+int ivl_sil_traces(const void *model, const void *specs, size_t n, int n_threads, double period_s, void *rows, size_t capacity,
+                   uint64_t *n_rows, void *outcomes);
+
 /// A flight core of this configuration (layout IVL_SIL_LAYOUT_CONFIG) and policy (form, and 64 parameters in SI) steps through n recorded inputs, where the model's core runs.
 /// @param[out] rows  n rows of IVL_SIL_TABLE_REPLAY_OUT
 /// @return 0; 1 if the core refuses the configuration, 2 if it refuses the policy

@@ -8,7 +8,8 @@ UNITY := build/unity
 
 SOURCES := $(wildcard firmware/core/*.c firmware/app/*.c)
 
-# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h
+# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h.  Of the other sources only ivl_form.c and
+# test_app.c see them, so the other objects for the host are those of the build without them.
 OWN     := $(if $(FORMS),-$(subst /,-,$(FORMS)))
 ifneq ($(FORMS),)
 FORMS_SOURCES := $(wildcard $(FORMS)/*.c)
@@ -18,11 +19,13 @@ HEADERS := $(wildcard firmware/core/*.h firmware/app/*.h tests/app/*.h tests/fuz
 
 # ---- host: sanitizers on, strict warnings on our own files
 
-HOST       := build/app$(OWN)
+HOST_SHARED := build/app
+HOST       := $(HOST_SHARED)$(OWN)
 HOST_FLAGS := -std=gnu11 -O1 -g -ffp-contract=off -fno-math-errno -fsanitize=address,undefined -fno-sanitize-recover=all \
               -Wall -Wextra -Wdouble-promotion -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes -Werror \
-              -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -Itests/c -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE $(FORMS_FLAGS)
-HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,$(SOURCES) $(FORMS_SOURCES) tests/app/sdk_double.c tests/c/default_fixture.c)
+              -DSDK_ON_HOST -DCONFIG_ENABLE_CPX=1 -Ifirmware/core -Ifirmware/app -Itests/app -Itests/c -isystem firmware/sdk -isystem $(UNITY) -DUNITY_INCLUDE_DOUBLE
+HOST_OBJ   := $(patsubst %.c,$(HOST)/%.o,firmware/core/ivl_form.c $(FORMS_SOURCES)) \
+              $(patsubst %.c,$(HOST_SHARED)/%.o,$(filter-out %/ivl_form.c,$(SOURCES)) tests/app/sdk_double.c tests/c/default_fixture.c) $(HOST_SHARED)/unity.o
 SEQUENCES  ?= 3000
 SEED       ?= 1
 # a hundred thousand take an hour on a busy machine
@@ -50,22 +53,32 @@ sequences: $(HOST)/sequences
 	@if timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED) --traitor > $(HOST)/traitor.txt; then echo 'error: sequences did not find the traitor' >&2; exit 1; fi
 	@grep -q 'a policy changed in flight' $(HOST)/traitor.txt || { cat $(HOST)/traitor.txt; exit 1; }
 
-$(HOST)/test_app: $(HOST)/tests/app/test_app.o $(HOST_OBJ) $(HOST)/unity.o
+$(HOST)/test_app: $(HOST)/tests/app/test_app.o $(HOST_OBJ)
 	@echo '  LINK  $@'
 	@$(CC) $(HOST_FLAGS) -o $@ $^ -lm
 
-$(HOST)/sequences: $(HOST)/tests/fuzz/sequences.o $(HOST_OBJ) $(HOST)/unity.o
+$(HOST)/sequences: $(HOST)/tests/fuzz/sequences.o $(HOST_OBJ)
 	@echo '  LINK  $@'
 	@$(CC) $(HOST_FLAGS) -o $@ $^ -lm
 
-$(HOST)/unity.o: $(UNITY)/unity.c
+$(HOST_SHARED)/unity.o: $(UNITY)/unity.c
 	@mkdir -p $(@D)
 	@$(CC) -DUNITY_INCLUDE_DOUBLE -I$(UNITY) -fsanitize=address,undefined -c -o $@ $<
 
+define compile_host
+@echo '  CC    $@'
+@mkdir -p $(@D)
+@$(CC) $(HOST_FLAGS) -c -o $@ $<
+endef
+
+$(HOST_SHARED)/%.o: %.c $(HEADERS) tools/app.mk
+	$(compile_host)
+
+ifneq ($(FORMS),)
+$(HOST)/%.o: private HOST_FLAGS += $(FORMS_FLAGS)
 $(HOST)/%.o: %.c $(HEADERS) tools/app.mk
-	@echo '  CC    $@'
-	@mkdir -p $(@D)
-	@$(CC) $(HOST_FLAGS) -c -o $@ $<
+	$(compile_host)
+endif
 
 objects: $(ARM_OBJ)
 	@tools/check_app.sh $(CROSS) '$(LIBRARY)' $(ARM)

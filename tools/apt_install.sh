@@ -1,14 +1,19 @@
 #!/bin/sh
-# Makes sure that commands exist, from Debian packages where they do not.
-# usage: apt_install.sh COMMAND:PACKAGE...      an empty COMMAND: the package is missing for another reason
+# Makes sure that commands and libraries exist, from Debian packages where they do not.
+# usage: apt_install.sh NAME:PACKAGE...      a NAME with `.so` is a library; an empty NAME: the package is missing for another reason
 set -eu
+
+exists() {
+    case $1 in
+    '') return 1 ;;
+    *.so*) "${PYTHON:-python3}" -c 'import ctypes, sys; ctypes.CDLL(sys.argv[1])' "$1" 2> /dev/null ;;
+    *) command -v "$1" > /dev/null ;;
+    esac
+}
 
 missing=
 for pair in "$@"; do
-    command=${pair%%:*}
-    if [ -z "$command" ] || ! command -v "$command" > /dev/null; then
-        missing="$missing ${pair#*:}"
-    fi
+    exists "${pair%%:*}" || missing="$missing ${pair#*:}"
 done
 [ -n "$missing" ] || exit 0
 

@@ -16,7 +16,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-RUNS = ((0, 1), (0, 2), (0, 5), (256, 2), (128, 1))  # bits of the registers, 0: the widest; threads
+RUNS = {0: (1, 2, 5), 256: (2,), 128: (1,)}
+"""Bits of the registers, 0: the widest; numbers of threads."""
 STREAMS = 9  # one more than the library flies side by side
 REFERENCE = Path(__file__).parent.parent / "tests" / "golden" / "landings.txt"
 
@@ -112,14 +113,15 @@ def widest() -> int:
     return native.library().use_registers()
 
 
-def report_of(library: Path, bits: int, threads: int) -> str:
-    """The lines of all cases as that library computes them, from a process of its own; raise if it fails."""
+def reports_of(library: Path, bits: int) -> dict[tuple[Path, int, int], str]:
+    """The lines of all cases by library, bits and threads, all threads from one process; raise if it fails."""
     environment = dict(os.environ, IVL_NATIVE_LIBRARY=str(library.resolve()), IVL_REGISTER_BITS=str(bits))
-    command = [sys.executable, str(Path(__file__).resolve()), "--fly", str(threads)]
+    command = [sys.executable, str(Path(__file__).resolve()), "--fly", *map(str, RUNS[bits])]
     run = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    if run.returncode != 0 or not run.stdout:
-        raise RuntimeError(f"{library}, {bits} bits, {threads} threads: exit code {run.returncode}\n{run.stderr}")
-    return run.stdout
+    lines, n = run.stdout.splitlines(keepends=True), len(CASES)
+    if run.returncode != 0 or len(lines) != n * len(RUNS[bits]):
+        raise RuntimeError(f"{library}, {bits} bits: exit code {run.returncode}, {len(lines)} lines\n{run.stderr}")
+    return {(library, bits, threads): "".join(lines[i * n : (i + 1) * n]) for i, threads in enumerate(RUNS[bits])}
 
 
 def differences(expected: str, found: str, label: str) -> int:
@@ -137,16 +139,18 @@ def main() -> int:
     """Compare all libraries with the reference; return 0 if every bit is equal."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--update", action="store_true", help="write the reference, if all libraries agree on it")
-    parser.add_argument("--fly", type=int, metavar="THREADS", help="print the lines of the loaded library, then end")
+    parser.add_argument(
+        "--fly", type=int, nargs="+", metavar="THREADS", help="print the lines of the loaded library, then end"
+    )
     parser.add_argument("libraries", nargs="*", type=Path)
     args = parser.parse_args()
     if args.fly is not None:
-        print(report(args.fly), end="")
+        print("".join(map(report, args.fly)), end="")
         return 0
     if not args.libraries:
         parser.error("no library given")
-    runs = [(path, bits, threads) for path in args.libraries for bits, threads in RUNS if bits <= widest()]
-    reports = {run: report_of(*run) for run in runs}
+    runs = [(path, bits) for path in args.libraries for bits in RUNS if bits <= widest()]
+    reports = {key: lines for run in runs for key, lines in reports_of(*run).items()}
     first = next(iter(reports.values()))
     if not args.update and not REFERENCE.exists():
         print(f"error: {REFERENCE} does not exist; make golden-update writes it", file=sys.stderr)

@@ -238,6 +238,9 @@ def run_pytest(test: str, processor_s: int = int(TIME_S)) -> int:
             for fd in (0, 1, 2):
                 os.dup2(quiet, fd)
             os.chdir(TREE)
+            # a fault may have the size and the time of what it replaces: nothing compiled may be kept
+            sys.dont_write_bytecode = True
+            os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
             os.environ["PYTHONPATH"] = str(TREE / "host")
             os.environ["HYPOTHESIS_STORAGE_DIRECTORY"] = str(TREE / "found")
             sys.path.insert(0, str(TREE / "host"))
@@ -255,14 +258,18 @@ def run_pytest(test: str, processor_s: int = int(TIME_S)) -> int:
     return -1
 
 
+def files_in(folder: Path) -> list[Path]:
+    """All files below a folder, but for what Python has compiled, which comes and goes while other tests run."""
+    return [Path(at, name) for at, _, names in os.walk(folder) for name in names if Path(at).name != "__pycache__"]
+
+
 def copy_tree() -> None:
     """The tree as it is; what was compiled in the copy before is kept, and makefiles compile what has changed since."""
     if DIRTY.exists():
         (TREE / DIRTY.read_text(encoding="utf-8")).write_bytes(b"")
         DIRTY.unlink()
     for name in ("firmware", "sim_sil", "tests", "tools", "host", "build/unity"):
-        wanted = {p.relative_to(ROOT) for p in (ROOT / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
-        there = {p.relative_to(TREE) for p in (TREE / name).rglob("*") if p.is_file() and p.suffix != ".pyc"}
+        wanted, there = ({p.relative_to(root) for p in files_in(root / name)} for root in (ROOT, TREE))
         for path in there - wanted:
             (TREE / path).unlink()
         for path in wanted:

@@ -10,8 +10,9 @@ CLANG   ?= clang-14
 SANITIZE := -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=all
 
 # the tests of `shared` link the product as libraries, so that a changed source costs one link and not one for each test
-FLAVOURS           := release O0 shared san clang clang-O0 fuzz
+FLAVOURS           := release O0 shared san clang clang-O0 fuzz aarch64
 OPTIMISE_release   := -O3 -fno-semantic-interposition
+OPTIMISE_aarch64   := $(OPTIMISE_release)
 OPTIMISE_O0        := -O0
 OPTIMISE_shared    := -O0
 OPTIMISE_san       := -O1 -g -fno-omit-frame-pointer $(SANITIZE)
@@ -21,7 +22,7 @@ OPTIMISE_fuzz      := -O2 -g -fno-omit-frame-pointer $(SANITIZE)
 ifeq ($(filter $(FLAVOUR),$(FLAVOURS)),)
 $(error FLAVOUR=$(FLAVOUR) is not one of: $(FLAVOURS))
 endif
-COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(CC))
+COMPILER := $(if $(filter clang% fuzz,$(FLAVOUR)),$(CLANG),$(if $(filter aarch64,$(FLAVOUR)),aarch64-linux-gnu-gcc,$(CC)))
 
 WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wfloat-equal -Wshadow -Wundef \
             -Wswitch-enum -Wcast-align -Wmissing-prototypes -Wstrict-prototypes -Werror
@@ -32,10 +33,14 @@ CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -DIVL_SIDE_BY_SIDE -
           -Ifirmware/core -Isim_sil -Isim_sil/physics -Isim_sil/world
 LDLIBS := -lm -pthread
 
-# objects of the release flavour also carry what GCC needs to optimise the library as a whole; the tests link them as they are
+# objects of the release flavour also carry what GCC needs to optimise library and vehicle as a whole; all others link them as they are, which
+# GCC does only if it is told to
+AS_THEY_ARE := -fno-lto
 ifneq ($(findstring Free Software Foundation,$(shell $(CC) --version)),)
 LTO_release := -flto -ffat-lto-objects
 LTO_LINK_release := -flto=auto
+# what is combined is not linked otherwise, so it needs no code of its own
+THIN_release := -fno-fat-lto-objects
 COMBINE_release = $(COMPILER) $(CFLAGS) $(LTO_LINK_release) -flinker-output=nolto-rel -nostdlib -r
 endif
 COMBINE = $(or $(COMBINE_$(FLAVOUR)),ld -r)
@@ -70,12 +75,15 @@ FLAGS_sim_sil/cf   += -fsanitize-coverage=inline-8bit-counters,pc-table
 FLAGS_firmware/app += -fsanitize-coverage=inline-8bit-counters,pc-table
 endif
 
-# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h
+# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h, which only ivl_form.c includes.  All other
+# objects are those of the build without them.
+SHARED  := build/$(FLAVOUR)
+BUILD   := $(SHARED)
 ifneq ($(FORMS),)
-CFLAGS += -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+BUILD       := $(SHARED)-$(subst /,-,$(FORMS))
+FORMS_CORE  := firmware/core/ivl_form.c $(wildcard $(FORMS)/*.c)
+FORMS_FLAGS := -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
 endif
-
-BUILD   := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
 
 # Physics and world are compiled once more for each wider register: rollouts side by side, and the instructions that act on them.  Each such set is
 # one object, which shows the functions of sim_width.c and hides the rest.
@@ -84,20 +92,20 @@ WIDTHS    := $(if $(findstring x86_64,$(MACHINE)),4 8)
 WIDTH_4   := -mavx2
 WIDTH_8   := -mavx512f -mavx512dq -mavx512vl -mprefer-vector-width=512
 SHOWN     := ivl_sim_fly ivl_sim_hover
-WIDE      := $(WIDTHS:%=$(BUILD)/lanes%.o)
+WIDE      := $(WIDTHS:%=$(SHARED)/lanes%.o)
 WIDE_PART := $(patsubst %.c,%.o,$(wildcard sim_sil/physics/*.c sim_sil/world/*.c))
 
-CORE    := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
+CORE    := $(patsubst %.c,$(SHARED)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
 SENSES  := firmware/app/app_senses.c
-SIM     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES)) $(WIDE)
-CF      := $(patsubst %.c,$(BUILD)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
-SUPPORT := $(patsubst %.c,$(BUILD)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
+SIM     := $(patsubst %.c,$(SHARED)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES)) $(WIDE)
+CF      := $(patsubst %.c,$(SHARED)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
+SUPPORT := $(patsubst %.c,$(SHARED)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
 EXPORTS := sim_sil/exports.map
 LIBRARY := host/ivl/_native/libivl_sil.so
 SERVER  := host/ivl/_native/ivl_sil
-CRTP    := $(patsubst %.c,$(BUILD)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
-FAKE_CF := $(BUILD)/tests/crtp/fake_cf.o
+CRTP    := $(patsubst %.c,$(SHARED)/%.o,$(filter-out %/crtp_main.c,$(wildcard sim_sil/crtp/*.c)))
+FAKE_CF := $(SHARED)/tests/crtp/fake_cf.o
 
 # what the tests link: the objects, or libraries of them, which are found from the root of the repository; a library stands before what it needs
 ifeq ($(FLAVOUR),shared)
@@ -116,7 +124,7 @@ TIMEOUT_S ?= 14400
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: core lib sil check fuzz sequences FORCE
+.PHONY: core lib sil check examples fuzz sequences FORCE
 
 core: $(CORE)
 
@@ -144,7 +152,7 @@ $(SERVER): $(BUILD)/ivl_sil
 	@mkdir -p $(@D)
 	@cp $< $@.new && mv -f $@.new $@
 
-$(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/objects.txt
+$(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(SHARED)/sim_sil/crtp/crtp_main.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -o $@ $(filter %.o,$^) $(LDLIBS)
 
@@ -156,26 +164,26 @@ sequences: $(BUILD)/loop_sequences
 	@grep -q 'a stranger' $(BUILD)/loop_traitor.txt || { cat $(BUILD)/loop_traitor.txt; exit 1; }
 
 # sockets and clock are the program's own
-$(BUILD)/loop_sequences: $(BUILD)/tests/fuzz/loop_sequences.o $(CORE) $(SIM) $(CF) $(filter-out %/crtp_udp.o,$(CRTP)) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/loop_sequences: $(SHARED)/tests/fuzz/loop_sequences.o $(CORE) $(SIM) $(CF) $(filter-out %/crtp_udp.o,$(CRTP)) $(SUPPORT) $(SHARED)/unity.o $(BUILD)/objects.txt
 	@echo '  LINK  $@'
-	@$(COMPILER) $(CFLAGS) -Wl,--wrap=clock_gettime -Wl,--wrap=ivl_crtp_step -o $@ $(filter %.o,$^) $(LDLIBS)
+	@$(COMPILER) $(CFLAGS) $(AS_THEY_ARE) -Wl,--wrap=clock_gettime -Wl,--wrap=ivl_crtp_step -o $@ $(filter %.o,$^) $(LDLIBS)
 
-$(BUILD)/fuzz_crtp: $(BUILD)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
+$(BUILD)/fuzz_crtp: $(SHARED)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
 
 define link_test
 @echo '  LINK  $@'
-@$(COMPILER) $(CFLAGS) -o $@ $(filter %.o %.so,$^) $(LDLIBS)
+@$(COMPILER) $(CFLAGS) $(AS_THEY_ARE) -o $@ $(filter %.o %.so,$^) $(LDLIBS)
 endef
 
-$(BUILD)/test_crtp_%: $(BUILD)/tests/c/test_crtp_%.o $(TESTED_CRTP) $(TESTED) $(FAKE_CF) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_crtp_%: $(SHARED)/tests/c/test_crtp_%.o $(TESTED_CRTP) $(TESTED) $(FAKE_CF) $(SUPPORT) $(SHARED)/unity.o $(BUILD)/objects.txt
 	$(link_test)
 
-$(BUILD)/test_%: $(BUILD)/tests/c/test_%.o $(TESTED) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_%: $(SHARED)/tests/c/test_%.o $(TESTED) $(SUPPORT) $(SHARED)/unity.o $(BUILD)/objects.txt
 	$(link_test)
 
-$(BUILD)/test_cf_%: $(BUILD)/tests/c/test_cf_%.o $(TESTED_CF) $(TESTED) $(SUPPORT) $(BUILD)/unity.o $(BUILD)/objects.txt
+$(BUILD)/test_cf_%: $(SHARED)/tests/c/test_cf_%.o $(TESTED_CF) $(TESTED) $(SUPPORT) $(SHARED)/unity.o $(BUILD)/objects.txt
 	$(link_test)
 
 define link_tested
@@ -192,6 +200,22 @@ $(BUILD)/libtested_cf.so: $(CF)
 $(BUILD)/libtested_crtp.so: $(CRTP)
 	$(link_tested)
 
+# the core as other firmware compiles it: in C, and in C++ with the headers of a system
+EXAMPLES := $(BUILD)/examples/bare_loop $(BUILD)/examples/autopilot
+
+examples: $(EXAMPLES)
+	@for program in $(EXAMPLES); do echo "  FLY   $$program"; $$program || exit 1; done
+
+$(BUILD)/examples/bare_loop: examples/bare_loop.c examples/planar.h $(CORE)
+	@echo '  LINK  $@'
+	@mkdir -p $(@D)
+	@$(COMPILER) -std=c11 -Wall -Wextra -pedantic -Wshadow -Werror -ffp-contract=off -Ifirmware/core -o $@ $(filter %.c %.o,$^) -lm
+
+$(BUILD)/examples/autopilot: examples/autopilot.cpp examples/planar.h $(CORE)
+	@echo '  LINK  $@'
+	@mkdir -p $(@D)
+	@$(CXX) -std=c++17 -Wall -Wextra -pedantic -Wshadow -Werror -ffp-contract=off -isystem firmware/core -Iexamples -o $@ $(filter %.cpp %.o,$^) -lm
+
 run-test_%: $(BUILD)/test_% FORCE
 	@tools/run_unity.sh $<
 
@@ -201,23 +225,29 @@ define compile
 @$(COMPILER) $(CFLAGS) $(LTO_$(FLAVOUR)) $(WARNINGS) $(FLAGS_$(<D)) $(FLAGS_$(basename $(@F))) $(WIDTH) -MMD -MP -c -o $@ $<
 endef
 
-$(BUILD)/%.o: %.c $(BUILD)/flags.txt
+$(SHARED)/%.o: %.c $(SHARED)/flags.txt
 	$(compile)
 
+ifneq ($(FORMS),)
+$(BUILD)/%.o: private CFLAGS += $(FORMS_FLAGS)
+$(BUILD)/%.o: %.c $(SHARED)/flags.txt
+	$(compile)
+endif
+
 define width
-$(BUILD)/lanes$1/%.o: WIDTH = -DIVL_SIM_LANES=$1 $(WIDTH_$1)
-$(BUILD)/lanes$1/%.o: %.c $(BUILD)/flags.txt
+$(SHARED)/lanes$1/%.o: WIDTH = -DIVL_SIM_LANES=$1 $(WIDTH_$1) $(THIN_$(FLAVOUR))
+$(SHARED)/lanes$1/%.o: %.c $(SHARED)/flags.txt
 	$$(compile)
 
-$(BUILD)/lanes$1.o: $(WIDE_PART:%=$(BUILD)/lanes$1/%) $(BUILD)/objects.txt
+$(SHARED)/lanes$1.o: $(WIDE_PART:%=$(SHARED)/lanes$1/%) $(SHARED)/widths.txt
 	@echo '  LD    $$@'
 	@$(COMBINE) -o $$@ $$(filter %.o,$$^)
 	@objcopy $(SHOWN:%=--keep-global-symbol=%_lanes$1) $$@
 endef
 $(foreach n,$(WIDTHS),$(eval $(call width,$n)))
 
-$(BUILD)/unity.o: WARNINGS :=
-$(BUILD)/unity.o: $(UNITY)/unity.c tools/native.mk
+$(SHARED)/unity.o: WARNINGS :=
+$(SHARED)/unity.o: $(UNITY)/unity.c tools/native.mk
 	$(compile)
 
 # rewritten only when their content changes: compile anew when flags do, link anew when a source comes or goes
@@ -229,11 +259,14 @@ define remember
 @printf '%s\n' '$1' | cmp -s - $@ || printf '%s\n' '$1' > $@
 endef
 
-$(BUILD)/flags.txt: FORCE
+$(SHARED)/flags.txt: FORCE
 	$(call remember,$(ALL_FLAGS))
 
 $(BUILD)/objects.txt: FORCE
 	$(call remember,$(ALL_OBJECTS))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(BUILD)/sim_sil/crtp/crtp_main.o $(BUILD)/tests/fuzz/fuzz_crtp.o $(BUILD)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(BUILD)/tests/c/%.o) \
-    $(foreach n,$(WIDTHS),$(WIDE_PART:%=$(BUILD)/lanes$n/%)))
+$(SHARED)/widths.txt: FORCE
+	$(call remember,$(WIDE_PART))
+
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(SHARED)/sim_sil/crtp/crtp_main.o $(SHARED)/tests/fuzz/fuzz_crtp.o $(SHARED)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(SHARED)/tests/c/%.o) \
+    $(foreach n,$(WIDTHS),$(WIDE_PART:%=$(SHARED)/lanes$n/%)))

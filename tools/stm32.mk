@@ -45,16 +45,19 @@ FLAGS_test_ivl_math := -DSWEEP_STRIDE=97
 # the start-up code fills and clears memory: its loops must not become calls to themselves
 FLAGS_startup := -fno-builtin
 
-# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h
+BUILD    := build/$(FLAVOUR)
+SHARED    := $(BUILD)
+# FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h.  Of the other sources only ivl_form.c
+# sees them, so all other objects are those of the build without them.
 ifneq ($(FORMS),)
-CFLAGS += -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+BUILD       := $(SHARED)-$(subst /,-,$(FORMS))
+FORMS_FLAGS := -I. -DIVL_FORMS_FILE='"$(FORMS)/forms.h"'
+FORMS_CORE  := firmware/core/ivl_form.c $(wildcard $(FORMS)/*.c)
 endif
-
-BUILD    := build/$(FLAVOUR)$(if $(FORMS),-$(subst /,-,$(FORMS)))
 TARGET   := firmware/stm32f405
 PROGRAMS := tick_server replay faults
-CORE     := $(patsubst %.c,$(BUILD)/%.o,$(wildcard firmware/core/*.c $(if $(FORMS),$(FORMS)/*.c)))
-COMMON   := $(BUILD)/$(TARGET)/startup.o $(BUILD)/$(TARGET)/semihost.o
+CORE     := $(patsubst %.c,$(SHARED)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
+COMMON   := $(SHARED)/$(TARGET)/startup.o $(SHARED)/$(TARGET)/semihost.o
 TESTS    := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_ivl_*.c))
 INSTALLED := host/ivl/_native/stm32f405.elf
 
@@ -95,15 +98,15 @@ define link
 @$(LINKER) $(LDFLAGS) -o $@ $(filter %.o,$^) -lm
 endef
 
-$(BUILD)/tick_server.elf $(BUILD)/replay.elf: $(BUILD)/%.elf: $(BUILD)/$(TARGET)/%.o $(BUILD)/$(TARGET)/serve.o $(CORE) $(COMMON) \
+$(BUILD)/tick_server.elf $(BUILD)/replay.elf: $(BUILD)/%.elf: $(SHARED)/$(TARGET)/%.o $(SHARED)/$(TARGET)/serve.o $(CORE) $(COMMON) \
                                              $(TARGET)/stm32f405.ld
 	$(link)
 
-$(BUILD)/faults.elf: $(BUILD)/$(TARGET)/faults.o $(COMMON) $(TARGET)/stm32f405.ld
+$(BUILD)/faults.elf: $(SHARED)/$(TARGET)/faults.o $(COMMON) $(TARGET)/stm32f405.ld
 	$(link)
 
-$(BUILD)/test_%.elf: $(BUILD)/tests/c/test_%.o $(CORE) $(COMMON) $(BUILD)/tests/c/default_fixture.o $(BUILD)/unity.o \
-                     $(BUILD)/$(TARGET)/unity_output.o $(TARGET)/stm32f405.ld
+$(BUILD)/test_%.elf: $(SHARED)/tests/c/test_%.o $(CORE) $(COMMON) $(SHARED)/tests/c/default_fixture.o $(SHARED)/unity.o \
+                     $(SHARED)/$(TARGET)/unity_output.o $(TARGET)/stm32f405.ld
 	$(link)
 
 run-test_%: $(BUILD)/test_%.elf FORCE
@@ -112,21 +115,27 @@ run-test_%: $(BUILD)/test_%.elf FORCE
 define compile
 @echo '  CC    $@'
 @mkdir -p $(@D)
-@$(COMPILER) $(CFLAGS) $(SYSTEM) $(WARNINGS) $(FLAGS_$(@D:$(BUILD)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
+@$(COMPILER) $(CFLAGS) $(SYSTEM) $(WARNINGS) $(FLAGS_$(@D:$(SHARED)/%=%)) $(FLAGS_$(basename $(@F))) -MMD -MP -c -o $@ $<
 endef
 
-$(BUILD)/%.o: %.c $(BUILD)/flags.txt
+$(SHARED)/%.o: %.c $(SHARED)/flags.txt
 	$(compile)
 
-$(BUILD)/unity.o: WARNINGS :=
-$(BUILD)/unity.o: $(UNITY)/unity.c $(BUILD)/flags.txt
+ifneq ($(FORMS),)
+$(BUILD)/%.o: private CFLAGS += $(FORMS_FLAGS)
+$(BUILD)/%.o: %.c $(SHARED)/flags.txt
+	$(compile)
+endif
+
+$(SHARED)/unity.o: WARNINGS :=
+$(SHARED)/unity.o: $(UNITY)/unity.c $(SHARED)/flags.txt
 	$(compile)
 
 # rewritten only when their content changes: compile anew when flags do
 ALL_FLAGS = $(COMPILER) $(CFLAGS) $(SYSTEM) $(WARNINGS) $(foreach v,$(sort $(filter FLAGS_%,$(.VARIABLES))),$v=$($v))
 
-$(BUILD)/flags.txt: FORCE
+$(SHARED)/flags.txt: FORCE
 	@mkdir -p $(@D)
 	@printf '%s\n' "$(ALL_FLAGS)" | cmp -s - $@ || printf '%s\n' "$(ALL_FLAGS)" > $@
 
--include $(wildcard $(BUILD)/*.d $(BUILD)/firmware/*/*.d $(BUILD)/tests/c/*.d)
+-include $(wildcard $(foreach folder,$(sort $(SHARED) $(BUILD)),$(folder)/*.d $(folder)/*/*.d $(folder)/*/*/*.d))

@@ -7,8 +7,15 @@
 ///     ivl_state_t state; ivl_init(&cfg, &state);          // ivl_cfg_check(&cfg) says whether it is good
 ///     ivl_policy_commit(&cfg, &state, &policy);
 ///     for each tick: ivl_step(&cfg, &state, &in, &out);   // at cfg.tick_hz
+///
+/// To port it: docs/PORTING.md.
 #ifndef IVL_H
 #define IVL_H
+#include <math.h>  // before the linkage of C is declared: in C++ it has templates
+#ifdef __cplusplus
+extern "C"
+{
+#endif
 #include "ivl_guard.h"
 #include "ivl_mixer.h"
 #include "ivl_phase.h"
@@ -52,5 +59,8 @@ void ivl_step(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_
 /// @param[out] ref  what the controller is to follow, if the result is true
 /// @return false: out->thrust_N is complete
 bool ivl_step_decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in, ivl_out_t *out, ivl_reference_t *ref);
+#endif
+#ifdef __cplusplus
+}
 #endif
 #endif  // IVL_H

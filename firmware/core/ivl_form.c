@@ -1,6 +1,17 @@
 /// @file ivl_form.c
 #include "ivl_form.h"
 
+/// Forms of one's own stand in a folder that `make FORMS=folder` names: sources, and forms.h with IVL_FORMS_OWN(X).  Nothing else sees that
+/// file, so builds with and without it share all other objects.
+#ifdef IVL_FORMS_FILE
+#include IVL_FORMS_FILE
+#else
+#define IVL_FORMS_OWN(X)
+#endif
+IVL_FORMS_OWN(IVL_FORM_DECLARE)
+
+#define IVL_FORMS(X) IVL_FORMS_BUILT_IN(X) IVL_FORMS_OWN(X)
+
 #define ROW(name) &ivl_form_##name,
 static const ivl_form_t *const FORMS[] = {IVL_FORMS(ROW)};
 

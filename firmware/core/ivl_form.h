@@ -67,16 +67,8 @@ typedef struct
     X(bilinear)
 // clang-format on
 
-/// Forms of one's own stand in a folder that `make FORMS=folder` names: sources, and forms.h with IVL_FORMS_OWN(X).
-#ifdef IVL_FORMS_FILE
-#include IVL_FORMS_FILE
-#else
-#define IVL_FORMS_OWN(X)
-#endif
-#define IVL_FORMS(X) IVL_FORMS_BUILT_IN(X) IVL_FORMS_OWN(X)
-
 #define IVL_FORM_DECLARE(name) extern const ivl_form_t ivl_form_##name;
-IVL_FORMS(IVL_FORM_DECLARE)
+IVL_FORMS_BUILT_IN(IVL_FORM_DECLARE)
 
 /// A form by its number, NULL if there is none with that number.
 const ivl_form_t *ivl_form(uint32_t number);

@@ -33,5 +33,9 @@ class StoreError(IvlError):
     """A run folder cannot be created, read, or continued."""
 
 
+class MissingError(IvlError, ImportError):
+    """A package that this use needs is not installed (also an ImportError)."""
+
+
 class LinkError(IvlError):
     """The link to a vehicle is missing, was lost, or did not do what was asked."""

@@ -150,25 +150,31 @@ def _site(path: str) -> str:
 class Named(Strict):
     """What a file calls itself."""
 
-    name: Name
-    doc: str = Field(min_length=1)
+    name: Name = Field(description="Run folders are named after it.")
+    doc: str = Field(min_length=1, description="What it is, in a line.")
 
 
 class Experiment(Task, Named):
     """A complete, checked experiment; `to_yaml` gives the text from which the same object is read."""
 
-    start: Literal["imparted", "flown"] = "imparted"
-    policy: Policy
-    learner: LearnerChoice
-    n_rollouts: int = Field(default=8, ge=1, le=10_000)
-    budget: int = Field(default=160, ge=1, le=1_000_000)
-    reward: RewardChoice = RewardChoice()
-    check: Check = Check()
+    start: Literal["imparted", "flown"] = Field(
+        default="imparted", description="At the approach velocity, or from hover."
+    )
+    policy: Policy = Field(description="What is learned: a form, and where the search for each of its numbers begins.")
+    learner: LearnerChoice = Field(description="Who learns; see `ivl list learners`, or module:name of your own.")
+    n_rollouts: int = Field(
+        default=8, ge=1, le=10_000, description="Rollouts of an episode, before the learner is told."
+    )
+    budget: int = Field(default=160, ge=1, le=1_000_000, description="Rollouts in all; a multiple of n_rollouts.")
+    reward: RewardChoice = Field(
+        default=RewardChoice(), description="What is paid for; see `ivl list rewards`, or module:name of your own."
+    )
+    check: Check = Field(default=Check(), description="How it is judged whether the task is solved.")
     flown: list[Flown] = Field(default_factory=list, description="real flights to draw beside the learning")
     site: Annotated[str, AfterValidator(_site)] | None = Field(
         default=None, description="site file of the room in which a drone flies it"
     )
-    seed: int = Field(default=0, ge=0, lt=2**63)
+    seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of learner and world.")
 
     @model_validator(mode="after")
     def _whole_episodes(self) -> Self:
@@ -239,7 +245,7 @@ def load(
     """Read, change and check an experiment.
 
     Args:
-        path: A file; if it does not exist, the same path inside the package.
+        path: A file; if it does not exist, the same path inside the package, or the bare name of one there.
         settings: "a.b=value" each: a field of the experiment, or a world parameter such as "sense.latency=0.01".
         change: Changes the raw data before settings and replacements do.
         **replacements: Fields to replace; None leaves what the file says. `learner` takes a name and drops the options.
@@ -247,16 +253,22 @@ def load(
     Raises:
         ConfigError: One line naming file, field and value.
     """
-    file = locate(path, list_experiments())
-    data = read_mapping(file)
-    if "tasks" in data:
-        raise ConfigError(f"{file.name}: tasks: an experiment for every approach; learn it with ivl policy learn")
+    data, label = read(path)
     if change is not None:
         change(data)
     replace(data, replacements)
     for setting in settings:
-        apply_setting(data, setting, Experiment, file.name)
-    return from_data(data, file.name)
+        apply_setting(data, setting, Experiment, label)
+    return from_data(data, label)
+
+
+def read(path: str) -> tuple[dict[str, Any], str]:
+    """The raw data of an experiment's file, and what errors call the file (path and errors as `load`)."""
+    file = locate(path, list_experiments())
+    data = read_mapping(file)
+    if "tasks" in data:
+        raise ConfigError(f"{file.name}: tasks: an experiment for every approach; learn it with ivl policy learn")
+    return data, file.name
 
 
 def replace(data: dict[str, Any], replacements: Mapping[str, Any]) -> None:

@@ -22,6 +22,7 @@ from ivl.landing import LandingSpec
 from ivl.learning.recorder import SCORED, RolloutRows
 from ivl.links.forecast import Forecast, Forecasts
 from ivl.outcome import four_leg
+from ivl.table import Rows
 from ivl.world import Trace, World, rotation
 
 FloatArray = npt.NDArray[np.float64]
@@ -91,7 +92,7 @@ def as_trace(flight: Flight, world: World, outcome: Any, simulated: Trace) -> Tr
     turned = np.einsum("ijn,lj->nli", rotation(rows["q_WB"].T), feet_B)
     rows["foot_W_m"] = (turned + rows["p_WB_m"][:, None, :]).reshape(rows["foot_W_m"].shape)
     rows["d_ceil_m"] = world.surface.gap_m(rows["p_WB_m"])
-    return Trace(rows.view(np.recarray), outcome)
+    return Trace(rows.view(Rows), outcome)
 
 
 @dataclass(frozen=True)

@@ -347,6 +347,27 @@ class NativeModel:
             rows = np.zeros(n_rows, dtype=self._library.trace_dtype)
         raise NativeError(f"the trace needs {n_rows} rows after {rows.size} had been promised")
 
+    def traces(
+        self, specs: npt.NDArray[np.void], period_s: float, n_rows: int, n_threads: int
+    ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.uint64], npt.NDArray[np.void]]:
+        """Fly `specs` (1-D) and record each every `period_s`.
+
+        Returns:
+            Rows, shape (n, n_rows), zero behind the end of a landing; rows that each landing has, which may be more;
+            outcomes, shape (n,).
+        """
+        outcomes = np.zeros(specs.shape, dtype=self._library.outcome_dtype)
+        rows = np.zeros((specs.size, n_rows), dtype=self._library.trace_dtype)
+        counts = np.zeros(specs.size, dtype=np.uint64)
+        call = self._library._c.ivl_sil_traces
+        status = call(
+            self._handle, _pointer(specs), specs.size, n_threads, period_s, _pointer(rows), n_rows, _pointer(counts),
+            _pointer(outcomes),
+        )  # fmt: skip
+        if status != 0:
+            raise NativeError(f"the native batch of {specs.size} traces failed with status {status}")
+        return rows, counts, outcomes
+
     def _trace_into(
         self, spec: npt.NDArray[np.void], period_s: float, rows: npt.NDArray[np.void], outcome: npt.NDArray[np.void]
     ) -> int:
@@ -412,6 +433,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_surface_forward", None, (ptr, ptr)),
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
+        ("ivl_sil_traces", c_int, (ptr, ptr, size, c_int, double, ptr, size, ptr, ptr)),
         ("ivl_sil_replay", c_int, (ptr, ptr, c_int, ptr, ptr, size, ptr)),
         ("ivl_sil_form", ctypes.c_uint32, (c_int, textp, textp)),
         ("ivl_sil_form_group", c_int, (c_int, ctypes.c_uint32, ctypes.POINTER(_CField), textp)),

@@ -30,6 +30,7 @@ from ivl import (
     margin,
     native,
     numerics,
+    plugins,
     references,
     sessions,
     yamlfile,
@@ -46,6 +47,7 @@ from ivl.learning.loop import LearningRun, Progress, recent_rate, trials_of
 from ivl.learning.recorder import DISCARDED, SCORED, EpisodeRow, RolloutRows
 from ivl.links.options import Options
 from ivl.outcome import four_leg
+from ivl.rewards import REWARDS
 from ivl.settings import read_mapping
 from ivl.source import RolloutSource, TrialSource, WorldSource
 from ivl.store import EARLIER_FILE, SCHEMA_VERSION, RunStore, check_version, read_manifest, write_json
@@ -342,7 +344,9 @@ def default_folder(chosen: Experiment, n_trials: int | None, resume: bool) -> Pa
     Raises:
         StoreError: Nothing is there to resume.
     """
-    base = f"{chosen.name}-{chosen.learner.name}-seed{chosen.seed}" + (f"-x{n_trials}" if n_trials else "")
+    base = f"{chosen.name}-{plugins.title(chosen.learner.name)}-seed{chosen.seed}" + (
+        f"-x{n_trials}" if n_trials else ""
+    )
     return numbered_folder(base, resume)
 
 
@@ -393,11 +397,21 @@ def make_manifest(
         "numerics": numerics.kernel(),
         "platform": platform.platform(),
         "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "plugins": _plugins(chosen),
         "units": {f"out_{name}": field.unit for name, field in library.outcome_fields.items()},
         "parameters": {
             n: {"value": _json_number(v), "from": world.params.origin[n]} for n, v in world.params.values.items()
         },
     }
+
+
+def _plugins(chosen: Experiment) -> dict[str, dict[str, Any]]:
+    """Learner and reward that are not of this package."""
+    names = {
+        "learner": "" if chosen.learner.name in LEARNERS else chosen.learner.name,
+        "reward": "" if chosen.reward.name in REWARDS else chosen.reward.name,
+    }
+    return plugins.described({field: name for field, name in names.items() if name})
 
 
 def _open(
@@ -419,11 +433,16 @@ def _open(
         raise StoreError(
             f"{folder}: cannot be resumed: the terms of its reward or the parameters of its policy changed"
         )
+    notes = [
+        f"{field} {now['name']}: its source changed since the run began"
+        for field, now in manifest["plugins"].items()
+        if old.get("plugins", {}).get(field, now) != now
+    ]
     if not old.get("flown"):
-        return store, []
+        return store, notes
     continued, changed = sessions.go_on(old, manifest["sessions"][0])
     write_json(folder / "manifest.json", continued)
-    return store, changed
+    return store, [*notes, *changed]
 
 
 def _refuse_other_run(folder: Path, old: dict[str, Any], manifest: dict[str, Any], chosen: Experiment) -> None:

@@ -3,6 +3,24 @@
 APPROACHES = ("accelerate_hold", "constant_acceleration", "constant_rrev", "region")
 """Shapes of the approach, in the order of the flight core's numbers."""
 
+APPROACH_DOCS = {
+    "accelerate_hold": "speeds up to the approach speed, and holds it",
+    "constant_acceleration": "speeds up all the way, and has the approach speed at the ceiling",
+    "constant_rrev": "closes in so that RREV stays as it is",
+    "region": "speeds up, and may flip anywhere in a region of speeds",
+}
+"""What `ivl list approaches` says."""
+
+ESTIMATOR_DOCS = {
+    "known_height": "height of the ceiling as configured, less the last position that came",
+    "known_height_predicted": "the same, carried on by the velocity to the present tick",
+    "formula": "from RREV and the accelerometer by a formula, with guards",
+    "formula_unguarded": "the same without guards, to show what they are for",
+    "kalman": "from RREV and the accelerometer by a Kalman filter",
+    "range": "from a range finder that looks up",
+}
+"""What `ivl list estimators` says."""
+
 ESTIMATORS: dict[str, dict[str, float]] = {
     "known_height": {"firmware.d_source": 0.0, "firmware.d_predict": 0.0},
     "known_height_predicted": {"firmware.d_source": 0.0, "firmware.d_predict": 1.0},

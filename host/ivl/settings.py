@@ -35,11 +35,18 @@ class Setting(Strict):
 
 
 def locate(path: str, shipped: Sequence[str]) -> Path:
-    """A file as given, else inside this package; `shipped` are the names that an error offers."""
-    for candidate in (Path(path), PACKAGE_DIR / path):
+    """A file as given, else inside this package, where its bare name is enough; `shipped` are the names that there are.
+
+    Raises:
+        ConfigError: There is no such file.
+    """
+    named = [name for name in shipped if path in (Path(name).stem, Path(name).name)]
+    for candidate in (Path(path), PACKAGE_DIR / path, *(PACKAGE_DIR / name for name in named)):
         if candidate.is_file():
             return candidate
-    raise ConfigError(f"{path}: no such file, neither here nor in the package (shipped: {', '.join(shipped)})")
+    stems = [Path(name).stem for name in shipped]
+    near = yamlfile.did_you_mean(Path(path).stem, stems)
+    raise ConfigError(f"{path}: no such file, neither here nor in the package (shipped: {', '.join(shipped)}){near}")
 
 
 def read_mapping(file: Path) -> dict[str, Any]:
@@ -69,9 +76,26 @@ def apply_setting(data: dict[str, Any], setting: str, kind: type[BaseModel], lab
         label: File that errors name.
     """
     path, value = parse_setting(setting)
+    apply_value(data, path, value, kind, label, "set on the command line", f"--set {setting}")
+
+
+def apply_value(
+    data: dict[str, Any], path: str, value: Any, kind: type[BaseModel], label: str, source: str, said: str
+) -> None:
+    """Write one value into raw data.
+
+    Args:
+        data: As for `apply_setting`, and so are `kind` and `label`.
+        path: Dotted path.
+        value: The value.
+        kind: What the data is to become.
+        label: File that errors name.
+        source: Where the value comes from; stands beside an override.
+        said: How it was said, for errors.
+    """
     check_path(path, kind, label)
     value = references.absolute(value, Path.cwd()) if path in references.FIELDS else value
-    put(data, path, value, "set on the command line", f"{label}: --set {setting}")
+    put(data, path, value, source, f"{label}: {said}")
 
 
 def check_path(path: str, kind: type[BaseModel], label: str, forbidden: Sequence[str] = ()) -> None:

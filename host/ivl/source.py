@@ -158,6 +158,7 @@ def portions(world: World, outcomes: Outcomes) -> Iterator[Flown]:
     Raises:
         RolloutError: Not one of them could begin.
     """
+    outcomes = outcomes.view(np.recarray)  # a selection of these need not carry the arguments
     good = valid(outcomes)
     if len(outcomes) and all(world.end_reason(code) == REFUSED for code in set(outcomes["end_reason"].tolist())):
         raise RolloutError(f"no landing can begin: {CANNOT_BEGIN}")

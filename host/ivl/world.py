@@ -12,14 +12,20 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ivl import forms, model, native
 from ivl.errors import ArgumentError, NativeError
+from ivl.outcome import as_dict, verdict
 from ivl.surface import Surface
+from ivl.table import Rollouts, Rows
+
+if TYPE_CHECKING:
+    import pandas as pd  # type: ignore[import-untyped]
+    import xarray as xr
 
 START_CODES = {"imparted": 0, "flown": 1, "at_trigger": 2, "state": 3}
 _BATCH_ROLLOUTS = 16384  # per native call, so that Ctrl-C is answered within seconds
@@ -30,6 +36,7 @@ REFUSED = "refused"
 CANNOT_BEGIN = "the start lies in the ceiling or behind it, or the flight core refuses the policy"
 _LEVEL_OUT = "level_out"
 _QUATERNION_SLACK = 4e-4
+_NEVER_S = 60.0  # later than any landing ends
 _HOVER_S_MAX, _HOVER_M_MAX = 600.0, 100.0
 
 FloatArray = npt.NDArray[np.float64]
@@ -93,12 +100,32 @@ class Trace:
 
     Attributes:
         rows: Record array of the library's trace table, shape (n_rows,): time, pose, velocities, thrusts, feet,
-            phase, cues.
+            phase, cues (`rows.fields` has units and meanings).
         outcome: The rollout's outcome record, equal to what `World.rollouts` returns for the same arguments.
     """
 
-    rows: np.recarray[Any, Any]
+    rows: Rows
     outcome: np.record
+
+    @property
+    def verdict(self) -> str:
+        """The outcome in words."""
+        return verdict(self.outcome)
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The rows as a data frame (`ivl.table.Table.to_pandas`)."""
+        return self.rows.to_pandas()
+
+    def to_xarray(self) -> "xr.Dataset":
+        """The rows as a data set over the time `t_s`; its attributes are the fields of the outcome."""
+        data = self.rows.to_xarray()
+        library = native.library()
+        data.attrs = as_dict(self.outcome, library.end_reason(int(self.outcome["end_reason"])))
+        return data
+
+    def __repr__(self) -> str:
+        """What was flown, in words."""
+        return f"<trace of a landing: {self.verdict}; {len(self.rows)} rows, {float(self.rows.t_s[-1]):.3f} s>"
 
 
 class World:
@@ -221,8 +248,9 @@ class World:
         threads: int | None = None,
         stream: npt.ArrayLike | None = None,
         state: State | None = None,
+        flip_at_s: FloatLike | None = None,
         **named: FloatLike,
-    ) -> np.recarray[Any, Any]:
+    ) -> Rollouts:
         """Fly one rollout for each element of the broadcast of the arguments.
 
         Args:
@@ -239,16 +267,19 @@ class World:
             threads: Worker threads; omitted: all processors.
             stream: Number of the rollout within its seed; omitted: the flat index in this call.
             state: State to start from; for "state" alone, which needs it.
+            flip_at_s: Time of the flip, s, in place of the threshold of the form `constant`: the first tick from then
+                on that sees the ceiling come closer flips. Omitted, or 0: the policy decides.
 
         Returns:
-            Record array of outcomes in the shape of the broadcast; fields of the library's outcome table.
+            Record array of outcomes in the shape of the broadcast; fields of the library's outcome table. See
+            `ivl.table.Rollouts` for data frames, units and meanings.
 
         Raises:
             ArgumentError: An argument is not finite, out of range, or does not broadcast.
         """
-        specs, shape = self._specs(
+        specs, shape, given = self._specs(
             start, stream, state, form, theta, named,
-            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
+            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed, flip_at_s=flip_at_s,
         )  # fmt: skip
         n_threads = _check_threads(threads)
         n = math.prod(shape)
@@ -256,7 +287,7 @@ class World:
         for first in range(0, n, _BATCH_ROLLOUTS):
             part = slice(first, min(first + _BATCH_ROLLOUTS, n))
             outcomes[part] = self._native.rollouts(specs(part), n_threads)
-        return outcomes.reshape(shape).view(np.recarray)
+        return Rollouts.of(outcomes.reshape(shape), given)
 
     def trace(
         self,
@@ -270,19 +301,60 @@ class World:
         stream: int = 0,
         period_s: float = 0.002,
         state: State | None = None,
+        flip_at_s: float | None = None,
         **named: float,
     ) -> Trace:
         """Fly one rollout and record it every `period_s` seconds (arguments and errors as `rollouts`, scalars only)."""
-        specs, shape = self._specs(
+        specs, shape, _ = self._specs(
             start, stream, state, form, theta, named,
-            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed,
+            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed, flip_at_s=flip_at_s,
         )  # fmt: skip
         if shape != ():
             raise ArgumentError(f"trace: the arguments must be scalars, they broadcast to {shape}")
         if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
             raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
         rows, outcome = self._native.trace(specs(slice(0, 1)), period_s)
-        return Trace(rows.view(np.recarray), outcome.view(np.recarray)[0])
+        return Trace(rows.view(Rows), outcome.view(np.recarray)[0])
+
+    def approaches(
+        self,
+        speed_mps: FloatLike,
+        angle_deg: FloatLike,
+        n_rows: int,
+        period_s: float = 0.01,
+        seed: npt.ArrayLike = 0,
+        start: str = "imparted",
+        threads: int | None = None,
+        stream: npt.ArrayLike | None = None,
+    ) -> Rows:
+        """Fly approaches that nobody ends by a flip, and record what the vehicle senses on its way to the ceiling.
+
+        A landing with the same arguments and a flip at `flip_at_s` is the same up to that time, bit for bit.
+
+        Args:
+            speed_mps: As for `rollouts`, and so are angle_deg, seed, start, threads and stream.
+            angle_deg: Likewise.
+            n_rows: Most rows of an approach that are kept.
+            period_s: Time between two rows, s.
+            seed: Likewise.
+            start: Likewise.
+            threads: Likewise.
+            stream: Likewise.
+
+        Returns:
+            Rows, shape (..., n_rows); those behind the first contact with the ceiling have the time NaN.
+        """
+        specs, shape, _ = self._specs(
+            start, stream, None, forms.PAPER, (0.0, 0.0), {},
+            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=None, seed=seed, flip_at_s=_NEVER_S,
+        )  # fmt: skip
+        if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
+            raise ArgumentError(f"approaches: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
+        n = math.prod(shape)
+        rows, counts, outcomes = self._native.traces(specs(slice(0, n)), period_s, n_rows, _check_threads(threads))
+        over = rows["t_s"] >= np.nan_to_num(outcomes["t_impact_s"], nan=np.inf)[:, None]
+        rows["t_s"][over | (np.arange(n_rows) >= counts[:, None])] = np.nan
+        return rows.reshape(*shape, n_rows).view(Rows)
 
     def hover(
         self,
@@ -291,7 +363,7 @@ class World:
         seed: npt.ArrayLike = 0,
         stream: npt.ArrayLike | None = None,
         period_s: float = 0.01,
-    ) -> np.recarray[Any, Any]:
+    ) -> Rows:
         """Hover from set-point to set-point, without a landing.
 
         Args:
@@ -324,7 +396,7 @@ class World:
             raise ArgumentError(f"seed, stream: do not broadcast to {shape}, the shape of the flights") from error
         n_rows = round(duration_s / period_s) + 1
         rows = self._native.hovers(points.reshape(-1, *points.shape[-2:]), seeds, period_s, n_rows)
-        return rows.reshape(*shape, n_rows).view(np.recarray)
+        return rows.reshape(*shape, n_rows).view(Rows)
 
     def _setpoints(self, setpoints: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Checked set-points of hovers, shape (..., n, 4)."""
@@ -349,8 +421,8 @@ class World:
         theta: tuple[npt.ArrayLike, ...],
         named: Mapping[str, npt.ArrayLike],
         **arguments: npt.ArrayLike | None,
-    ) -> tuple[Callable[[slice], npt.NDArray[np.void]], tuple[int, ...]]:
-        """What gives a part of the checked, broadcast and flattened specifications, and the shape that all have.
+    ) -> tuple[Callable[[slice], npt.NDArray[np.void]], tuple[int, ...], dict[str, npt.NDArray[Any]]]:
+        """What gives a part of the checked, broadcast and flattened specifications; the shape that all have; arguments.
 
         A specification has room for a long policy, so those of a large batch are not made at once.
         """
@@ -360,8 +432,12 @@ class World:
             if (start == needed) != (value is not None):
                 raise ArgumentError(f"{name}: value {value!r}: start={needed!r} needs it, others must not have it")
         given = {
-            name: _numbers(name, value) for name, value in arguments.items() if name != "d_ceil_m" or value is not None
+            name: _numbers(name, value)
+            for name, value in arguments.items()
+            if name not in ("d_ceil_m", "flip_at_s") or value is not None
         }
+        if "flip_at_s" in given and form_name != forms.PAPER:
+            raise ArgumentError(f"flip_at_s: only a policy of the form {forms.PAPER} is timed, not one of {form_name}")
         if stream is not None:
             given["stream"] = _numbers("stream", stream)
         given |= state.fields() if state is not None else {}
@@ -391,7 +467,22 @@ class World:
                     records[name] = array[part]
             return records
 
-        return specs, shape
+        return specs, shape, self._told(given, form, theta, named, shape)
+
+    @staticmethod
+    def _told(
+        given: Mapping[str, npt.NDArray[Any]],
+        form: forms.Form,
+        theta: tuple[npt.ArrayLike, ...],
+        named: Mapping[str, npt.ArrayLike],
+        shape: tuple[int, ...],
+    ) -> dict[str, npt.NDArray[Any]]:
+        """The arguments as they were given, by name: numbers of the policy in the units of their form."""
+        ordered = [*theta, *(named[name] for name in form.names[len(theta) :])]
+        told = {name: given[name] for name in ("speed_mps", "angle_deg", "d_ceil_m", "flip_at_s") if name in given}
+        told |= {name: np.asarray(value, np.float64) for name, value in zip(form.names, ordered, strict=True)}
+        stream = np.arange(math.prod(shape), dtype=np.uint64).reshape(shape)
+        return told | {"seed": given["seed"], "stream": given.get("stream", stream)}
 
     def _theta(
         self, form: forms.Form, theta: tuple[npt.ArrayLike, ...], named: Mapping[str, npt.ArrayLike]

@@ -6,7 +6,9 @@ refused. Refused are, too: a key given twice, a key that is no word, tags other 
 what is too large, too deep or multiplied by aliases. `dump` writes so that readers of both versions read the same.
 """
 
+import copy
 import difflib
+import functools
 import math
 import re
 from collections.abc import Iterable
@@ -187,12 +189,18 @@ for _tag, _pattern, _first in _PLAIN:
     _Dumper.add_implicit_resolver(_tag, re.compile(rf"(?:{_pattern.pattern})\Z"), _first)
 
 
+@functools.lru_cache(maxsize=32)
+def _load(text: str) -> Any:
+    """What a text says; a vehicle takes 20 ms to read, and programs make many worlds of few files."""
+    return yaml.load(text, Loader=_Loader)
+
+
 def parse(text: str, label: str) -> Any:
     """Parse YAML text; `label` names it in errors."""
     if len(text) > N_BYTES_MAX:
         raise ConfigError(f"{label}: {len(text)} characters (allowed {N_BYTES_MAX})")
     try:
-        return yaml.load(text, Loader=_Loader)
+        return copy.deepcopy(_load(text))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""

@@ -5,6 +5,8 @@
 #include "phys_plates.h"
 #include "world_step_size.h"
 
+#include <float.h>
+
 static const char *const END_NAMES[] = {"contact_time", "missed",     "missed_time", "time_max",
                                         "refused",      "not_finite", "step_limit",  "no_go"};
 _Static_assert(sizeof END_NAMES / sizeof END_NAMES[0] == IVL_SIM_END_COUNT, "a name for each end");
@@ -93,6 +95,17 @@ ivl_policy_t ivl_sim_policy(int32_t form, const double theta[IVL_SIM_THETAS], bo
     return policy;
 }
 
+/// Until its time a flip that is timed has a threshold that no cue reaches; from then on the policy flips at once.
+static void time_flip(ivl_sim_world_t *world, const ivl_sim_spec_t *spec)
+{
+    if (spec->flip_at_s[0] > 0.0)
+    {
+        const double next_s = (double)world->n_tick * world->model->tick_s;
+        world->firmware.policy.theta[0] = FLT_MAX;
+        world->firmware.policy.at_once = next_s >= spec->flip_at_s[0] - 1.0e-9;
+    }
+}
+
 static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], ivl_command_t *cmd)
 {
     cmd->request = IVL_REQUEST_APPROACH;
@@ -149,6 +162,10 @@ bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_
     }
     request_approach(spec, start.p_W_m, &world->in.cmd);
     const ivl_policy_t policy = ivl_sim_policy(spec->form[0], spec->theta, spec->start[0] == IVL_SIM_START_AT_TRIGGER);
+    if (spec->flip_at_s[0] > 0.0 && ivl_form((uint32_t)spec->form[0]) != &ivl_form_constant)
+    {
+        return false;  // where the threshold is, and that there is one, is known of this form alone
+    }
     return model->core.commit(group->port, lane, &model->firmware, &world->firmware, &policy) == IVL_OK;
 }
 
@@ -396,6 +413,7 @@ static void refill(ivl_sim_group_t *group, int lane, ivl_sim_source_t source, vo
         }
         else if (ivl_sim_rollout_start(group, lane, job->spec))
         {
+            time_flip(&group->world[lane], job->spec);
             trace(job->tracer, group, lane);
         }
         else
@@ -416,6 +434,10 @@ static void between_ticks(ivl_sim_group_t *group, int lane, ivl_sim_source_t sou
     {
         work->used += (uint64_t)group->progress.n_evaluation[lane];
         refill(group, lane, source, context, job);
+    }
+    else
+    {
+        time_flip(&group->world[lane], job->spec);
     }
 }
 

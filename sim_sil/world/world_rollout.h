@@ -45,7 +45,8 @@ typedef enum
     X(double, q_start_WB, 4, "f8", "1", -1, 1, 0, "start state: attitude, x y z w, of unit length") \
     X(double, w_start_B_radps, 3, "f8", "rad/s", -100, 100, 0, "start state: angular rate in body axes") \
     X(double, rotor_start_radps, 4, "f8", "rad/s", -1, 100000, -1, "start state: rotor speeds; below 0: at hover") \
-    X(double, battery_start_V, 1, "f8", "V", 0, 30, 0, "start state: open-circuit voltage; 0: the vehicle's own, with its scatter")
+    X(double, battery_start_V, 1, "f8", "V", 0, 30, 0, "start state: open-circuit voltage; 0: the vehicle's own, with its scatter") \
+    X(double, flip_at_s, 1, "f8", "s", 0, 60, 0, "form constant: time of the first tick that may flip, and does if it sees the ceiling close; 0: the threshold decides")
 
 #define IVL_SIM_OUTCOME_FIELDS(X) \
     X(int32_t, n_legs, 1, "i4", "1", 0, 4, 0, "feet stuck at the end") \

@@ -194,7 +194,7 @@ def test_help_teaches_with_examples(words: list[str], capsys: pytest.CaptureFixt
 @pytest.fixture
 def run_folder(truth: Truth, tmp_path: Path) -> Path:
     """A run of two episodes whose recordings were kept."""
-    settings = ["learner.name=ephe_robust", "n_rollouts=4", "budget=8", "check.n_fresh=10", "check.effort=0.05"]
+    settings = ["learner.name=ephe_robust", "n_rollouts=4", "budget=8", "check.n_fresh=10", "check.effort=0.01"]
     settings += [
         "check.grid.rrev_c_per_s={lo: 4.5, hi: 5.0, step: 0.1}",
         "check.grid.moment_y_Nmm={lo: 7.0, hi: 9.0, step: 1.0}",

@@ -238,3 +238,24 @@ def test_a_drone_behind_any_link_needs_a_room_that_is_measured_and_tracked(
     ):
         with pytest.raises(ConfigError, match=told):
             enter(in_room if place else vertical, place, **options)
+
+
+def test_an_installed_package_gives_a_site_by_an_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = (
+        "from ivl.links.sites.room import Room\n\n\n"
+        "class Cage(Room):\n"
+        "    suits = staticmethod(lambda session, options: not session.has_param('sil.reset'))\n\n\n"
+        "class Shed:\n"
+        "    suits = staticmethod(lambda session, options: True)\n"
+    )
+    (tmp_path / "ivl_site_of_a_lab.py").write_text(source)
+    info = tmp_path / "lab-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[ivl.sites]\ncage = ivl_site_of_a_lab:Cage\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert sites.site_for(Connected(software=False), Options()).__name__ == "Cage"  # type: ignore[arg-type]
+    assert sites.site_for(Connected(software=True), Options()) is Simulator  # type: ignore[arg-type]
+    (info / "entry_points.txt").write_text("[ivl.sites]\nshed = ivl_site_of_a_lab:Shed\n")
+    with pytest.raises(ConfigError, match="site 'shed': Shed lacks after_fault"):
+        sites.site_for(Connected(software=False), Options())  # type: ignore[arg-type]

@@ -147,7 +147,7 @@ def test_the_command_serves_the_page_while_it_learns(
         serve(view, *why)
 
     monkeypatch.setattr(View, "__exit__", leave)
-    small = ["learner.name=ephe_robust", "n_rollouts=2", "budget=4", "check.effort=0.05", "check.n_fresh=10"]
+    small = ["learner.name=ephe_robust", "n_rollouts=2", "budget=4", "check.effort=0.01", "check.n_fresh=10"]
     small += ["check.grid.rrev_c_per_s={lo: 4.5, hi: 5, step: 0.1}", "check.grid.moment_y_Nmm={lo: 7, hi: 9, step: 1}"]
     words = [word for text in small for word in ("--set", text)] + ["--trials", "1", "--json"]
     assert cli.run(["learn", "experiments/paper_vertical.yaml", *words, "--live-at", "127.0.0.1:0"]) == 0

@@ -3,6 +3,7 @@
 The package is imported before numpy, since it sets the number of BLAS threads.
 """
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import ivl  # isort: split
 
 import numpy as np
 
-from ivl import experiment
+from ivl import experiment, run
 from ivl.experiment import Experiment
 
 
@@ -22,8 +23,7 @@ def world() -> ivl.World:
     return ivl.World("habas2021", "wide_short", "as_simulated")
 
 
-@pytest.fixture
-def small_data() -> dict[str, Any]:
+def small_experiment() -> dict[str, Any]:
     """Raw data of an experiment that learns and is judged within a second."""
     return {
         "name": "small",
@@ -42,7 +42,7 @@ def small_data() -> dict[str, Any]:
         "budget": 16,
         "check": {
             "n_fresh": 10,
-            "effort": 0.05,
+            "effort": 0.01,
             "grid": {
                 "rrev_c_per_s": {"lo": 4.5, "hi": 5.0, "step": 0.1},
                 "moment_y_Nmm": {"lo": 7.0, "hi": 9.0, "step": 1.0},
@@ -52,8 +52,25 @@ def small_data() -> dict[str, Any]:
 
 
 @pytest.fixture
-def small(small_data: dict[str, Any]) -> Experiment:
-    return experiment.from_data(small_data, "small.yaml")
+def small_data() -> dict[str, Any]:
+    return small_experiment()
+
+
+@pytest.fixture(scope="session")
+def small() -> Experiment:
+    return experiment.from_data(small_experiment(), "small.yaml")
+
+
+@pytest.fixture(scope="session")
+def small_run(small: Experiment, tmp_path_factory: pytest.TempPathFactory) -> run.RunResult:
+    """A finished run of it, made once for all tests, which only read it."""
+    return run.run(small, tmp_path_factory.mktemp("small") / "run")
+
+
+@pytest.fixture
+def finished(small_run: run.RunResult, tmp_path: Path) -> Path:
+    """The folder of a finished run, for the test alone."""
+    return Path(shutil.copytree(small_run.folder, tmp_path / "finished"))
 
 
 @pytest.fixture

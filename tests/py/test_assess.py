@@ -106,7 +106,7 @@ def test_the_best_policy_lands_and_its_search_is_reproducible(small: Experiment,
 
 def test_the_best_policy_beats_every_point_of_its_grid(small: Experiment) -> None:
     grid = {**small.check.grid, "moment_y_Nmm": GridAxis(lo=3, hi=8, step=1)}
-    chosen = small.model_copy(update={"check": small.check.model_copy(update={"effort": 0.5, "grid": grid})})
+    chosen = small.model_copy(update={"check": small.check.model_copy(update={"effort": 0.2, "grid": grid})})
     world = ivl.World("habas2021", "wide_short", "as_simulated", **{"sense.velocity_noise": 0.05})
     best = assess.find_best(world, chosen)
     theta = assess._grid(assess._axes(chosen))

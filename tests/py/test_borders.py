@@ -313,6 +313,10 @@ SHORT = (
     "check.n_fresh=2",
     "--set",
     "check.effort=0.001",
+    "--set",
+    "check.grid.rrev_c_per_s.step=1.0",
+    "--set",
+    "check.grid.moment_y_Nmm.step=4.0",
 )
 PAPER = "experiments/paper_vertical.yaml"
 

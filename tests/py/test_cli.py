@@ -221,9 +221,8 @@ def test_learn_cannot_resume_what_is_not_there(
     assert message in refused(["learn", *given], capsys, code=1)
 
 
-def test_learn_does_not_overwrite_a_run(capsys: Capture, small_file: Path) -> None:
-    json_of(["learn", str(small_file), "--out", "r"], capsys)
-    assert "holds a run already" in refused(["learn", str(small_file), "--out", "r"], capsys, code=1)
+def test_learn_does_not_overwrite_a_run(capsys: Capture, small_file: Path, finished: Path) -> None:
+    assert "holds a run already" in refused(["learn", str(small_file), "--out", str(finished)], capsys, code=1)
 
 
 def test_ctrl_c_says_how_to_resume_and_the_resumed_run_is_the_same(

@@ -20,10 +20,9 @@ def of(small: Experiment, **change: Any) -> Experiment:
 
 
 @pytest.fixture
-def before(small: Experiment, tmp_path: Path) -> Path:
-    """The folder of a finished run."""
-    run.run(small, tmp_path / "before")
-    return tmp_path / "before"
+def before(finished: Path) -> Path:
+    """The folder of the earlier run."""
+    return finished
 
 
 @pytest.mark.parametrize("learner", ["ephe_memory", "ephe", "cmaes"])

@@ -69,7 +69,8 @@ def test_landings_have_the_same_bits_in_registers_of_any_width(vehicle: str, sen
     finally:
         library.use_registers()
     assert len({outcomes.tobytes() for outcomes in found.values()}) == 1
-    assert len(set(found[0]["end_reason"])) >= 3
+    assert len(set(found[0]["end_reason"])) >= 2
+    assert len(set(found[0]["n_legs"])) >= 3
 
 
 def test_registers_are_those_of_the_environment_or_the_widest(monkeypatch: pytest.MonkeyPatch) -> None:

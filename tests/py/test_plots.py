@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,13 @@ from planes import MOVING, NORMALS
 import ivl
 from ivl import run
 from ivl.errors import ConfigError
-from ivl.experiment import Experiment
 from ivl.plots import convergence, strobe, style
 from ivl.world import Trace, rotation
 
 
 @pytest.fixture
-def result(small: Experiment, tmp_path: Path) -> run.RunResult:
-    return run.run(small, tmp_path / "run")
+def result(small_run: run.RunResult, finished: Path) -> run.RunResult:
+    return replace(small_run, folder=finished)
 
 
 def is_picture(path: Path) -> bool:

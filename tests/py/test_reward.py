@@ -104,14 +104,14 @@ def test_a_reward_has_options_of_its_own_alone() -> None:
 
 def test_a_choice_writes_every_default_and_reads_itself_back() -> None:
     choice = RewardChoice(name="authors_code")
-    assert choice.model_dump(mode="json") == {"name": "authors_code", "options": {"h_ceil_m": 2.1}}
+    assert choice.model_dump(mode="json") == {"name": "authors_code", "options": {"weights": {}, "h_ceil_m": 2.1}}
     assert RewardChoice.model_validate(choice.model_dump(mode="json")) == choice
-    assert RewardChoice().model_dump(mode="json")["options"] == {"d_floor_m": 0.05}
+    assert RewardChoice().model_dump(mode="json")["options"] == {"weights": {}, "d_floor_m": 0.05}
 
 
 def test_terms_that_were_not_declared_are_an_error() -> None:
     odd = Reward("odd", "", (Quantity("legs", "1", "feet"),), lambda outcomes, _: {"total": outcomes["n_legs"]})
-    with pytest.raises(ValueError, match=r"reward odd: gives \['total'\], declares \['legs', 'total'\]"):
+    with pytest.raises(ConfigError, match=r"reward odd: gives \['total'\], declares \['legs', 'total'\]"):
         odd.score(outcome(4), Options())
 
 
@@ -119,3 +119,22 @@ def test_terms_that_were_not_declared_are_an_error() -> None:
 def test_terms_that_cannot_be_columns_are_refused(names: list[str]) -> None:
     with pytest.raises(ValueError, match="must be different names of columns"):
         Reward("odd", "", tuple(Quantity(name, "1", "") for name in names), lambda _outcomes, _options: {})
+
+
+def test_a_weight_is_a_factor_on_one_term_and_on_its_part_of_the_return() -> None:
+    record = outcome(3, 1, 0.25, 45.0)
+    plain, weighted = terms("paper", record), terms("paper", record, weights={"legs": 0.5, "angle": 3.0})
+    assert weighted["legs"] == 0.5 * plain["legs"] == 37.5
+    assert weighted["angle"] == 3.0 * plain["angle"] == 15.0
+    assert weighted["distance"] == plain["distance"] == 4.0
+    assert weighted["total"] == 4.0 + 15.0 + 37.5
+
+
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [({"lgs": 1.0}, r"weights.lgs: no such term \(the reward paper has distance, angle, legs\)"),
+     ({"legs": -1.0}, "greater than or equal to 0"), ({"legs": float("inf")}, "finite"), ({"legs": "2"}, "number")],
+)  # fmt: skip
+def test_a_weight_that_cannot_be_is_refused(weights: dict[str, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        RewardChoice(name="paper", options={"weights": weights})

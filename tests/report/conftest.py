@@ -34,7 +34,7 @@ SMALL = {
     "budget": 24,
     "check": {
         "n_fresh": 10,
-        "effort": 0.05,
+        "effort": 0.01,
         "grid": {
             "rrev_c_per_s": {"lo": 4.5, "hi": 5.0, "step": 0.1},
             "moment_y_Nmm": {"lo": 7.0, "hi": 9.0, "step": 1.0},

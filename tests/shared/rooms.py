@@ -32,7 +32,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def vertical(n_rollouts: int, budget: int) -> Experiment:
     """The experiment, with episodes of so many rollouts."""
     settings = ["learner.name=ephe_robust", f"n_rollouts={n_rollouts}", f"budget={budget}"]
-    settings += ["check.n_fresh=10", "check.effort=0.05"]
+    settings += ["check.n_fresh=10", "check.effort=0.01"]
     settings += [
         "check.grid.rrev_c_per_s={lo: 4.5, hi: 5.0, step: 0.1}",
         "check.grid.moment_y_Nmm={lo: 7.0, hi: 9.0, step: 1.0}",

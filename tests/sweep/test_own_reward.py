@@ -49,7 +49,7 @@ def chosen(tmp_path: Path, own_reward: RewardChoice) -> Experiment:
     sweep = make(tmp_path, learner={"name": "bo"}, reward=own_reward.model_dump(), n_rollouts=4, budget=16)
     data = sweep.experiment("wide_long", 3.5, 90.0, 0).model_dump()
     grid = {"rrev_c_per_s": {"lo": 4.0, "hi": 5.0, "step": 0.5}, "moment_y_Nmm": {"lo": 7.0, "hi": 9.0, "step": 1.0}}
-    return experiment.from_data({**data, "check": {"n_fresh": 5, "effort": 0.05, "grid": grid}}, "own.yaml")
+    return experiment.from_data({**data, "check": {"n_fresh": 5, "effort": 0.01, "grid": grid}}, "own.yaml")
 
 
 def test_a_run_learns_stores_resumes_and_reports(chosen: Experiment, own_reward: RewardChoice, tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_a_reward_whose_terms_changed_is_not_resumed(
 def test_the_command_line_knows_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["list", "rewards", "--json"]) == 0
     (entry,) = (e for e in json.loads(capsys.readouterr().out)["rewards"] if e["name"] == "feet")
-    assert entry["options"] == {"per_foot": 0.001}
+    assert entry["options"] == {"weights": {}, "per_foot": 0.001}
     assert entry["terms"]["time_s"] == {"unit": "s", "doc": "time of flight"}
 
 

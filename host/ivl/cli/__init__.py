@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from ivl import __version__, files
+from ivl import __version__, files, optional
 from ivl.cli import (
     amend,
     bench,
@@ -26,6 +26,7 @@ from ivl.cli import (
     flash,
     flight,
     fly,
+    init,
     learn,
     listing,
     mocap,
@@ -72,6 +73,8 @@ app.command("figs", help=figs.HELP, short_help="Draw the paper's figures 4 to 9 
 app.command("export", help=export.HELP, short_help="Write a landing as MCAP, CSV or .rrd.")(export.export)
 app.command("estimate", help=estimate.HELP, short_help="Show how well the core knows its distance.")(estimate.estimate)
 app.command("list", help=listing.HELP)(listing.list_)
+app.command("init", help=init.HELP, short_help="Write a new experiment with comments.")(init.init)
+app.command("schema", help=init.SCHEMA_HELP, short_help="Print the schema of a kind of file, for editors.")(init.schema)
 app.command("bench", help=bench.HELP)(bench.bench)
 app.command("sil", help=sil.HELP)(sil.sil)
 app.command("fly", help=fly.HELP, short_help="Fly one landing with a vehicle.")(fly.fly)
@@ -108,6 +111,11 @@ def run(arguments: list[str] | None = None) -> int:
         return _fail(f"{error.format_message().replace('Value error, ', '')} (try `{command} --help`)", 2)
     except (KeyboardInterrupt, typer.Abort):
         return 130
+    except ModuleNotFoundError as error:
+        advice = optional.hint(error)
+        if advice is None:
+            raise
+        return _fail(advice, 1)
     except BrokenPipeError:
         return 1  # whoever read the output has gone, as `head` does: nobody is left to tell
     except OSError as error:

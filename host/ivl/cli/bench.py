@@ -100,7 +100,8 @@ def _fly(world: World, landings: Landings, at_once: int | None = None) -> tuple[
     """Fly landings on one thread, some at a time, three times: best rate (1/s), occupancy, steps a landing."""
     specs, model = landings.specs(), world.native_model
     parts = np.split(specs, range(at_once, specs.size, at_once)) if at_once else [specs]
-    best_s, flown = np.inf, []
+    best_s = np.inf
+    flown: list[tuple[npt.NDArray[np.void], float]] = []
     for _ in range(3):
         began = time.thread_time()
         flown = [model.rollouts_and_occupancy(part, 1) for part in parts]
@@ -119,7 +120,7 @@ def _sets(world: World, n: int) -> dict[str, float]:
         "slowest_cell": (Landings(few, 0.25, 60.0, *every), 256),
         "learner": (Landings(n, 2.5, 90.0, *every), 8),
     }
-    result = {}
+    result: dict[str, float] = {}
     for name, (landings, at_once) in sets.items():
         rate, occupancy, _ = _fly(world, landings, at_once)
         result |= {f"rollouts_per_s_{name}": rate, f"occupancy_{name}": occupancy}

@@ -37,10 +37,19 @@ def load(path: Path | None, **said: str | float | None) -> PolicyFile | None:
     """
     if path is None:
         return None
-    for name, value in said.items():
-        if value is not None:
-            raise ConfigError(f"--policy {path}: already given by --{name}")
+    only("--policy", path, **said)
     return file.load(path)
+
+
+def only(option: str, path: Path, **others: object) -> None:
+    """Refuse options that say what another one says already.
+
+    Raises:
+        ConfigError: One of them was given.
+    """
+    for name, value in others.items():
+        if value is not None:
+            raise ConfigError(f"{option} {path}: already given by --{name}")
 
 
 def theta_of(name: str, theta: str | None, rrev: float | None, moment: float | None) -> list[float]:

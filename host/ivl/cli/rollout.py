@@ -1,5 +1,6 @@
 """`ivl rollout`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -7,11 +8,13 @@ import numpy as np
 import typer
 
 from ivl import forms, outcome, tracefile, yamlfile
+from ivl.api.runs import LearnRun, load
 from ivl.cli import console, policy_options
 from ivl.cli.task_options import EQUIPMENT, FLAGS, Chosen, task_options
 from ivl.errors import ConfigError
 from ivl.landing import LandingSpec
 from ivl.rewards import TOTAL, RewardChoice
+from ivl.task import Task
 from ivl.world import Trace, World
 
 HELP = """Fly one landing and print its outcome.
@@ -28,6 +31,8 @@ Examples:
       another vehicle, slower sensing
   ivl rollout --experiment experiments/paper_vertical.yaml --rrev 4.8 --moment 8
       the landing that an experiment learns; without it the legs are those of table1, which were built and flown
+  ivl rollout --run runs/paper_vertical-ephe-seed0 --plot landing.png
+      what a run has learned, on the vehicle, gear and approach that it flew
   ivl rollout --policy g.yaml --speed 1.2 --angle 35 --plot landing.png
       a policy for every approach (ivl policy learn), on what it was learned on, unless other options say otherwise; if
       it calls the approach off, the verdict says no_go, and the picture shows how the vehicle levels out
@@ -42,6 +47,10 @@ def rollout(
     form: policy_options.FormName = None,
     theta: policy_options.Theta = None,
     policy_file: policy_options.FileOption = None,
+    run_folder: Annotated[
+        Path | None,
+        typer.Option("--run", metavar="FOLDER", help="Fly what a run of ivl learn recommends, on what it flew."),
+    ] = None,
     distance: Annotated[float | None, typer.Option(help=f"{LandingSpec.model_fields['d_ceil_m'].description}")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.", min=0)] = 0,
     stream: Annotated[int, typer.Option(help="Number of the rollout within the seed.", min=0)] = 0,
@@ -54,15 +63,22 @@ def rollout(
         tracefile.check_suffix(trace)
     if plot and plot.suffix not in (".png", ".svg", ".pdf"):
         raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
-    learned = policy_options.load(policy_file, form=form, theta=theta, rrev=rrev, moment=moment)
+    said = {"form": form, "theta": theta, "rrev": rrev, "moment": moment}
+    learned = policy_options.load(policy_file, **said)
+    if run_folder is not None:
+        policy_options.only("--run", run_folder, policy=policy_file, experiment=chosen.path, **said)
     name = form or forms.PAPER
-    policy = (
-        {"form": learned.form, "theta": learned.values}
-        if learned is not None
-        else {"form": name, "theta": policy_options.theta_of(name, theta, rrev, moment)}
-    )
+    bases: Sequence[Task] = ()
+    if run_folder is not None:
+        spec = _of_run(run_folder)
+        policy: dict[str, Any] = {"form": spec.form, "theta": spec.theta}
+        bases = (Task(**{name: getattr(spec, name) for name in Task.model_fields}),)
+    elif learned is not None:
+        policy, bases = {"form": learned.form, "theta": learned.values}, learned.tasks
+    else:
+        policy = {"form": name, "theta": policy_options.theta_of(name, theta, rrev, moment)}
     numbers = {"seed": seed, "stream": stream, "d_ceil_m": distance}
-    data = chosen.fields(*(learned.tasks if learned is not None else ()))
+    data = chosen.fields(*bases)
     for name in ("speed_mps", "angle_deg"):
         if name not in data:
             raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")
@@ -76,6 +92,19 @@ def rollout(
         console.print_json(result)
     else:
         _report(result)
+
+
+def _of_run(folder: Path) -> LandingSpec:
+    """The landing that a run recommends.
+
+    Raises:
+        ConfigError: It is no run of `ivl learn`, or nothing of it is finished.
+        StoreError: There is no run.
+    """
+    found = load(folder)
+    if not isinstance(found, LearnRun):
+        raise ConfigError(f"--run {folder}: is no run of ivl learn; --policy and --rrev fly a landing of a sweep")
+    return found.landing()
 
 
 def _draw(world: World, flight: Trace, path: Path) -> None:
@@ -97,6 +126,9 @@ def _result(world: World, flight: Trace) -> dict[str, Any]:
 
 
 def _report(result: dict[str, Any]) -> None:
+    console.out.print(f"{'verdict':24s} {result['verdict']}", style="bold")
     for name, value in result.items():
+        if name == "verdict":
+            continue
         text = f"{value:.6g}" if isinstance(value, float) else "-" if value is None else str(value)
         console.out.print(f"{name:24s} {text}")

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn
 
-from ivl import references, run
+from ivl import plugins, references, run
 from ivl.cli import console, policy_options
 from ivl.family import MEMBER
 from ivl.policy import use
@@ -113,7 +113,7 @@ def sweep(
     grid = config.load_sweep(path, settings or [], [*(vary or []), *_members(family)], change, learner=learner)
     if learned is not None:
         use.check_as_it_is(grid, learned, learner)
-    base = f"{grid.name}-{references.title(grid.gear_set)}-{'-'.join(grid.learner_names())}"
+    base = f"{grid.name}-{references.title(grid.gear_set)}-{'-'.join(map(plugins.title, grid.learner_names()))}"
     return _run(grid, base, "ivl sweep", path, out, resume, scheduler, workers, task_size, dry_run, as_json)
 
 

@@ -18,16 +18,16 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyarrow as pa  # type: ignore[import-untyped]
-import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
+from ivl import optional
 from ivl.errors import ConfigError
 from ivl.flight.schema import FLIGHTS, SAMPLES, SCHEMA_VERSION, Column
 
 FloatArray = npt.NDArray[np.float64]
 
 MANIFEST, FLIGHTS_FILE, SAMPLES_FILE = "manifest.json", "flights.parquet", "samples.parquet"
-_TYPES = {"f8": pa.float64(), "i4": pa.int32(), "str": pa.string(), "bool": pa.bool_()}
+_TYPES = {"f8": "float64", "i4": "int32", "str": "string", "bool": "bool_"}
+"""Names of Arrow's types. Arrow is loaded when a file is read or written, which most users of this module never do."""
 _LINE = 200
 _MANIFEST_FIELDS = ("format", "source", "licence", "frames", "clock", "absent", "notes")
 
@@ -177,6 +177,7 @@ def write(folder: Path, flights: Flights) -> None:
 def _write_files(folder: Path, flights: Flights) -> None:
     present = [n for n in SAMPLES if n == "flight" or any(f.has(n) for f in flights)]
     schema = _schema({name: SAMPLES[name] for name in present})
+    pa, pq = _arrow()
     with pq.ParquetWriter(folder / SAMPLES_FILE, schema, compression="zstd") as writer:
         for number, flight in enumerate(flights):
             data = {n: np.full(len(flight), number, np.int32) if n == "flight" else flight[n] for n in present}
@@ -224,8 +225,9 @@ def _manifest(path: Path, data: Mapping[str, Any]) -> Manifest:
     return Manifest(**{name: data[name] for name in _MANIFEST_FIELDS})
 
 
-def _table(path: Path, known: Mapping[str, Column], needed: Iterable[str]) -> pa.Table:
+def _table(path: Path, known: Mapping[str, Column], needed: Iterable[str]) -> Any:
     """A Parquet file whose columns are of the schema; those of `needed` are there."""
+    pa, pq = _arrow()
     try:
         table = pq.ParquetFile(path).read()
         table.validate(full=True)
@@ -235,12 +237,12 @@ def _table(path: Path, known: Mapping[str, Column], needed: Iterable[str]) -> pa
         if name not in table.column_names:
             raise ConfigError(f"{path}: column {name} is missing")
     for name in table.column_names:
-        if name not in known or table.schema.field(name).type != _TYPES[known[name].kind]:
+        if name not in known or table.schema.field(name).type != getattr(pa, _TYPES[known[name].kind])():
             raise ConfigError(f"{path}: column {name} is none of version {SCHEMA_VERSION}, or of another type")
     return table
 
 
-def _flights(infos: Sequence[Mapping[str, Any]], table: pa.Table, path: Path) -> Iterator[Flight]:
+def _flights(infos: Sequence[Mapping[str, Any]], table: Any, path: Path) -> Iterator[Flight]:
     numbers = table.column("flight").to_numpy()
     if (np.diff(numbers) < 0).any():
         raise ConfigError(f"{path}: the flights are not in order")
@@ -254,15 +256,25 @@ def _flights(infos: Sequence[Mapping[str, Any]], table: pa.Table, path: Path) ->
             raise ConfigError(f"{path}: {error}") from error
 
 
+def _arrow() -> tuple[Any, Any]:
+    """Arrow and its Parquet.
+
+    Raises:
+        MissingError: They are not installed.
+    """
+    return optional.needed("pyarrow", "flight"), optional.needed("pyarrow.parquet", "flight")
+
+
 def _line(error: BaseException) -> str:
     """What an error says, in one line of reasonable length."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= _LINE else text[: _LINE - 3] + "..."
 
 
-def _schema(columns: Mapping[str, Column]) -> pa.Schema:
+def _schema(columns: Mapping[str, Column]) -> Any:
+    pa, _ = _arrow()
     fields = [
-        pa.field(c.name, _TYPES[c.kind], nullable=False, metadata={"unit": c.unit, "doc": c.doc})
+        pa.field(c.name, getattr(pa, _TYPES[c.kind])(), nullable=False, metadata={"unit": c.unit, "doc": c.doc})
         for c in columns.values()
     ]
     return pa.schema(fields, metadata={"ivl_schema_version": str(SCHEMA_VERSION)})

@@ -1,14 +1,16 @@
 """Learners by name: one registry for the command line, the experiments and the tests.
 
-A new learner is a subclass of `Learner` and one line in `LEARNERS`.
+A new learner of this package is a subclass of `Learner` and one line in `LEARNERS`. One of your own needs no line:
+`module:Class` is found too (`ivl.plugins`).
 """
 
+import inspect
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy.typing as npt
 
-from ivl.errors import LearnerError
+from ivl.errors import ConfigError, LearnerError
 from ivl.learners.base import Learner, Options, Result
 from ivl.learners.bo import BOLearner
 from ivl.learners.cma_learner import CMALearner
@@ -16,6 +18,7 @@ from ivl.learners.ephe import EPHE, RobustEPHE
 from ivl.learners.ephe_belief import EpheBelief
 from ivl.learners.ephe_memory import EpheMemory
 from ivl.learners.fixed import Fixed
+from ivl.plugins import Registry
 
 __all__ = [
     "EPHE",
@@ -43,7 +46,24 @@ class Entry:
     preset: dict[str, Any] = field(default_factory=dict)
 
 
-LEARNERS: dict[str, Entry] = {
+def _made(name: str, found: Any) -> Entry:
+    """A learner of one's own: a subclass of `Learner`, or an `Entry`.
+
+    Raises:
+        ConfigError: It is neither.
+    """
+    if isinstance(found, Entry):
+        return found
+    if not (inspect.isclass(found) and issubclass(found, Learner)):
+        what = found.__name__ if inspect.isclass(found) else type(found).__name__
+        raise ConfigError(f"learner {name!r}: {what} is no subclass of ivl.Learner")
+    if inspect.isabstract(found):
+        missing = ", ".join(sorted(found.__abstractmethods__))
+        raise ConfigError(f"learner {name!r}: {found.__name__} has yet to define {missing}")
+    return Entry(found, (inspect.getdoc(found) or "a learner of your own").splitlines()[0])
+
+
+_OWN: dict[str, Entry] = {
     "ephe": Entry(EPHE, "EPHE as published: best 3 of N, sigma about the old mean"),
     "ephe_new": Entry(
         EPHE, "EPHE as in its first author's slides: best 3 of N, sigma about the new mean", {"sigma_ref": "new"}
@@ -62,6 +82,8 @@ LEARNERS: dict[str, Entry] = {
     "bo": Entry(BOLearner, "Gaussian process with Thompson sampling: fewest crashes, most computing"),
 }
 
+LEARNERS: Registry[Entry] = Registry("learner", _made, _OWN)
+
 
 def make_learner(
     name: str,
@@ -78,7 +100,8 @@ def make_learner(
     Raises:
         LearnerError: There is no such learner, or an argument is wrong.
     """
-    if name not in LEARNERS:
-        raise LearnerError(f"learner: no learner {name!r} (allowed {', '.join(LEARNERS)})")
-    entry = LEARNERS[name]
+    try:
+        entry = LEARNERS[name]
+    except ConfigError as error:
+        raise LearnerError(f"learner: {error}") from error
     return entry.cls(mu0, sigma0, bounds=bounds, n_rollouts=n_rollouts, seed=seed, **{**entry.preset, **options})

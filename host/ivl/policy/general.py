@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from ivl import experiment, native, yamlfile
 from ivl.errors import ConfigError, IvlError
 from ivl.experiment import Bounds, LearnerChoice, Named
-from ivl.learners import LEARNERS, make_learner
+from ivl.learners import make_learner
 from ivl.policy.flying import Drawn, PolicyTask
 from ivl.policy.region import RegionField
 from ivl.policy.shape import General
@@ -137,8 +137,6 @@ def from_data(data: Any, label: str) -> GeneralExperiment:
         check_overrides(task.overrides, f"{label}: tasks.{i}")
     try:
         General(checked.form)
-        if checked.learner.name not in LEARNERS:
-            raise ConfigError(f"learner.name: no learner {checked.learner.name!r} (allowed {', '.join(LEARNERS)})")
         make_learner(checked.learner.name, [0.0], [0.1], bounds=[[-1.0, 1.0]], **checked.learner.options)
     except IvlError as error:
         raise ConfigError(f"{label}: {error}") from error

@@ -1,23 +1,59 @@
 """Rewards by name: one registry for the experiments, the stores, the reports and the command line.
 
-A new reward is one file here (see `paper.py`) and one row in `REWARDS`.
+A new reward of this package is one file here (see `paper.py`) and one row in `REWARDS`. One of your own needs neither:
+`module:name` of a `Reward`, or of a function of outcomes, is found too (`ivl.plugins`).
 """
 
+import inspect
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, ValidationInfo, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializeAsAny,
+    ValidationInfo,
+    field_validator,
+)
 
 from ivl.errors import ConfigError
 from ivl.outcome import Outcomes
+from ivl.plugins import Registry
 from ivl.rewards import authors_code, paper
-from ivl.rewards.base import TOTAL, FloatArray, Options, Reward
+from ivl.rewards.base import TOTAL, FloatArray, Options, Reward, Terms
+from ivl.table import Rollouts
 
 __all__ = ["REWARDS", "TOTAL", "Options", "Reward", "RewardChoice", "by_name"]
 
-REWARDS: dict[str, Reward] = {
-    "paper": paper.REWARD,
-    "authors_code": authors_code.REWARD,
-}
+
+def _made(name: str, found: Any) -> Reward:
+    """A reward of one's own: a `Reward`, or a function from outcomes to returns.
+
+    Raises:
+        ConfigError: It is neither.
+    """
+    if isinstance(found, Reward):
+        return found
+    if not callable(found) or inspect.isclass(found):
+        raise ConfigError(
+            f"reward {name!r}: is of the kind {type(found).__name__}, expected a Reward or a function of outcomes"
+        )
+
+    def compute(outcomes: Outcomes, _options: Options) -> Terms:
+        return {TOTAL: found(outcomes.view(Rollouts))}
+
+    lines = (inspect.getdoc(found) or "a reward of your own").splitlines()
+    return Reward(name, lines[0], (), compute)
+
+
+REWARDS: Registry[Reward] = Registry(
+    "reward",
+    _made,
+    {
+        "paper": paper.REWARD,
+        "authors_code": authors_code.REWARD,
+    },
+)
 
 
 def by_name(name: str) -> Reward:
@@ -26,8 +62,6 @@ def by_name(name: str) -> Reward:
     Raises:
         ConfigError: There is none.
     """
-    if name not in REWARDS:
-        raise ConfigError(f"reward: no reward {name!r} (allowed {', '.join(REWARDS)})")
     return REWARDS[name]
 
 
@@ -42,8 +76,10 @@ class RewardChoice(BaseModel):
     @field_validator("name")
     @classmethod
     def _known(cls, name: str) -> str:
-        if name not in REWARDS:
-            raise ValueError(f"no reward {name!r} (allowed {', '.join(REWARDS)})")
+        try:
+            by_name(name)
+        except ConfigError as error:
+            raise ValueError(str(error)) from error
         return name
 
     @field_validator("options", mode="before")
@@ -52,13 +88,17 @@ class RewardChoice(BaseModel):
         """Options of the chosen reward; those of a reward that does not exist are not looked at."""
         if "name" not in info.data:
             return Options()
-        own = REWARDS[info.data["name"]].options_type
-        return options if isinstance(options, own) else own.model_validate(options)
+        reward = REWARDS[info.data["name"]]
+        own = reward.options_type
+        checked = options if isinstance(options, own) else own.model_validate(options)
+        reward.check_weights(checked)
+        return checked
 
     @classmethod
     def further_paths(cls) -> dict[str, bool]:
-        """Paths of the options that any reward has, as `yamlfile.paths` tells them."""
-        return {f"options.{name}": False for reward in REWARDS.values() for name in reward.options_type.model_fields}
+        """Paths of the options that any reward has, as `yamlfile.paths` tells them; one of your own has others."""
+        own = {f"options.{name}": False for reward in REWARDS.values() for name in reward.options_type.model_fields}
+        return {"options": True, **own, "options.weights": True}
 
     @property
     def reward(self) -> Reward:

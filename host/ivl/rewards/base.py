@@ -10,12 +10,13 @@ Whatever stores or shows rewards takes the names, units and meanings of the term
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
+from ivl.errors import ConfigError
 from ivl.outcome import Outcomes
 from ivl.quantity import Quantity
 
@@ -27,10 +28,15 @@ TOTAL = "total"
 """Name of the return itself: finite and >= 0 for every rollout that may be learned from."""
 
 
+Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
 class Options(BaseModel):
     """Base of the options of a reward: checked strictly, unknown names refused."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    weights: dict[str, Weight] = Field(default={}, description="factors on terms of the return, by name; else 1")
 
 
 @dataclass(frozen=True)
@@ -57,14 +63,46 @@ class Reward:
         if len({TOTAL, *names}) <= len(names) or not all(re.fullmatch(r"[a-z]\w*", name) for name in names):
             raise ValueError(f"reward {self.name}: terms {names} must be different names of columns, none {TOTAL!r}")
 
-    def score(self, outcomes: Outcomes, options: Options) -> dict[str, FloatArray]:
-        """The declared terms in their order, and `total`, for outcomes of any shape.
+    def check_weights(self, options: Options) -> None:
+        """Refuse weights of terms that the reward does not have.
 
         Raises:
-            ValueError: The function's terms are not those that the reward declares.
+            ValueError: There is one.
+        """
+        names = [term.name for term in self.terms]
+        for name in options.weights:
+            if name not in names:
+                raise ValueError(
+                    f"weights.{name}: no such term (the reward {self.name} has {', '.join(names) or 'none'})"
+                )
+
+    def score(self, outcomes: Outcomes, options: Options) -> dict[str, FloatArray]:
+        """The declared terms in their order, weighted, and `total`, for outcomes of any shape.
+
+        A weight w on a term changes the return by (w - 1) times the term, so that a return which is the sum of its
+        terms becomes the sum of the weighted terms.
+
+        Raises:
+            ConfigError: What the function gives is not what the reward declares.
         """
         found = self.compute(outcomes, options)
         names = [TOTAL, *(term.name for term in self.terms)]
         if set(found) != set(names):
-            raise ValueError(f"reward {self.name}: gives {sorted(found)}, declares {sorted(names)}")
-        return {name: np.asarray(found[name], dtype=np.float64) for name in names}
+            raise ConfigError(f"reward {self.name}: gives {sorted(found)}, declares {sorted(names)}")
+        scored = {name: self._array(name, found[name], outcomes) for name in names}
+        for name, weight in options.weights.items():
+            scored[TOTAL] = scored[TOTAL] + (weight - 1.0) * scored[name]
+            scored[name] = weight * scored[name]
+        return scored
+
+    def _array(self, name: str, values: Any, outcomes: Outcomes) -> FloatArray:
+        """The values of a term, one number for each outcome."""
+        try:
+            array = np.asarray(values, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ConfigError(f"reward {self.name}: {name}: expected numbers: {error}") from error
+        if array.shape != outcomes.shape:
+            raise ConfigError(
+                f"reward {self.name}: {name}: shape {array.shape} (expected {outcomes.shape}: a number a rollout)"
+            )
+        return array

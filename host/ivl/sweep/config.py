@@ -39,6 +39,7 @@ from ivl.settings import (
     PACKAGE_DIR,
     Finite,
     apply_setting,
+    apply_value,
     check_overrides,
     check_path,
     locate,
@@ -57,6 +58,7 @@ from ivl.sweep.vary import (
     as_cell,
     is_flown,
     listed,
+    put_varied,
     refuse_varied,
     text_of,
     values,
@@ -351,13 +353,21 @@ def load_sweep(
     Raises:
         ConfigError: One line naming file, field and value.
     """
-    sweep = _load(Sweep, Experiment, path, settings, vary, replacements, change)
+    return _learnable(_load(Sweep, Experiment, path, settings, vary, replacements, change), Path(path).name)
+
+
+def _learnable(sweep: Sweep, label: str) -> Sweep:
+    """The sweep, whose variants can all be learned.
+
+    Raises:
+        ConfigError: One cannot.
+    """
     for varied in sweep.variants():
         grid = sweep.at(varied)
         try:
             gear, (speed_mps, angle_deg) = grid.gear_names()[0], grid.approaches()[0]
             trial = grid.experiment(gear, speed_mps, angle_deg, trial=0)
-            check_policy(trial, Path(path).name)
+            check_policy(trial, label)
             trial.make_learner(seed=0)
             if LEARNERS[trial.learner.name].cls.uses_simulator and trial.policy.form == forms.PAPER:
                 raise LearnerError(
@@ -365,7 +375,7 @@ def load_sweep(
                 )
         except LearnerError as error:
             where = "".join(f"vary.{path}={text_of(value)}: " for path, value in varied)
-            raise ConfigError(f"{Path(path).name}: {where}{error}") from error
+            raise ConfigError(f"{label}: {where}{error}") from error
     return sweep
 
 
@@ -379,27 +389,62 @@ def _load(
     replacements: dict[str, Any], change: Callable[[dict[str, Any]], None] | None = None,
 ) -> Grid:  # fmt: skip
     """Read a file; `varied` has the fields that may be varied."""
-    file = locate(path, list_sweeps())
-    data = read_mapping(file)
+    data, label = read(path)
     if change is not None:
         change(data)
     experiment.replace(data, replacements)
-    apply_vary(data, vary, file.name)
+    apply_vary(data, vary, label)
     for setting in settings:
-        refuse_varied(data, parse_setting(setting)[0], f"{file.name}: --set {setting}")
-        apply_setting(data, setting, kind, file.name)
+        refuse_varied(data, parse_setting(setting)[0], f"{label}: --set {setting}")
+        apply_setting(data, setting, kind, label)
     if replacements.get("learner") is not None:
-        refuse_varied(data, "learner.name", f"{file.name}: --learner {replacements['learner']}")
-    grid = yamlfile.validate(kind, data, file.name)
-    check_overrides(grid.overrides, file.name)
+        refuse_varied(data, "learner.name", f"{label}: --learner {replacements['learner']}")
+    return _checked(kind, varied, data, label)
+
+
+def read(path: str) -> tuple[dict[str, Any], str]:
+    """The raw data of a sweep or map file, and what errors call it (path as for `ivl.experiment.load`)."""
+    file = locate(path, list_sweeps())
+    return read_mapping(file), file.name
+
+
+def from_data(
+    data: dict[str, Any], label: str, options: Mapping[str, Any], vary: Mapping[str, Any]
+) -> Sweep | PolicyMap:
+    """Change and check raw data: of a map, if it has the distances of one, else of a sweep.
+
+    Args:
+        data: As a file has it; changed in place.
+        label: What errors call it.
+        options: Values by dotted path.
+        vary: Values by varied path, in place of what the data says of that path.
+
+    Raises:
+        ConfigError: One line naming label, field and value.
+    """
+    is_map = "d_ceil_m" in data
+    kind: type[Sweep | PolicyMap] = PolicyMap if is_map else Sweep
+    put_varied(data, vary, label)
+    for name, value in options.items():
+        refuse_varied(data, name, f"{label}: {name}")
+        apply_value(data, name, value, kind, label, "given to ivl.sweep", name)
+    if is_map:
+        return _checked(PolicyMap, Task, data, label)
+    return _learnable(_checked(Sweep, Experiment, data, label), label)
+
+
+def _checked(kind: type[Grid], varied: type[BaseModel], data: dict[str, Any], label: str) -> Grid:
+    """Raw data as a checked sweep or map."""
+    grid = yamlfile.validate(kind, data, label)
+    check_overrides(grid.overrides, label)
     for name in grid.vary:
         if name in _COLUMNS:
-            raise ConfigError(f"{file.name}: vary: {name}: decides which columns a run has: sweep each value by itself")
-        check_path(name, varied, f"{file.name}: vary", _NEVER_VARIED)
+            raise ConfigError(f"{label}: vary: {name}: decides which columns a run has: sweep each value by itself")
+        check_path(name, varied, f"{label}: vary", _NEVER_VARIED)
     try:
         _check_variants(grid)
     except ConfigError as error:
-        raise ConfigError(f"{file.name}: {error}") from error
+        raise ConfigError(f"{label}: {error}") from error
     return grid
 
 

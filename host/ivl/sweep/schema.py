@@ -23,6 +23,7 @@ from functools import cache
 import pyarrow as pa  # type: ignore[import-untyped]
 
 from ivl import native
+from ivl.columns import SHARED, columns_of
 from ivl.layout import EMPTY, Layout
 
 SCHEMA_VERSION = 2
@@ -38,13 +39,17 @@ COLUMN_OF = {"vehicle": "vehicle", "gear_set": "gear_set", "learner.name": "lear
 """Paths that a sweep may vary whose column is one of `CELL`; that of any other one begins with `VARIED`."""
 VARIED = "vary."
 
-_SUFFIX = {"1": "", "m": "m", "s": "s", "deg": "deg", "m/s": "mps", "rad/s": "radps", "1/s": "per_s"}
 _NAME, _F8, _I4, _I8 = pa.dictionary(pa.int16(), pa.string()), pa.float64(), pa.int32(), pa.int64()
 
 
 def field(name: str, kind: pa.DataType, unit: str, doc: str) -> pa.Field:
     """One column, with its unit and meaning."""
     return pa.field(name, kind, nullable=False, metadata={"unit": unit, "doc": doc})
+
+
+def shared(name: str, kind: pa.DataType) -> pa.Field:
+    """One column that data frames of a run have, too."""
+    return field(name, kind, SHARED[name].unit, SHARED[name].doc)
 
 
 def column_of(path: str) -> str:
@@ -87,13 +92,7 @@ def units(kind: str, layout: Layout = EMPTY) -> dict[str, str]:
 
 def outcome_columns() -> dict[str, tuple[str, int]]:
     """Column name -> (field of the library's outcome table, element of it), for the columns of a rollout's outcome."""
-    columns = {}
-    for name, entry in native.library().outcome_fields.items():
-        suffix = _SUFFIX[entry.unit]
-        base = name if not suffix or name.endswith(f"_{suffix}") else f"{name}_{suffix}"
-        for i in range(entry.count):
-            columns[base if entry.count == 1 else f"{base}_{i + 1}"] = (name, i)
-    return columns
+    return columns_of(native.library().outcome_fields)
 
 
 def _policy(layout: Layout, prefix: str, doc: str) -> list[pa.Field]:
@@ -110,17 +109,17 @@ def _terms(layout: Layout, prefix: str, doc: str) -> list[pa.Field]:
 
 def _cell() -> list[pa.Field]:
     return [
-        field("vehicle", _NAME, "1", "vehicle by name"),
-        field("gear_set", _NAME, "1", "set of landing gears"),
-        field("gear", _NAME, "1", "landing gear by name"),
-        field("learner", _NAME, "1", "learner by name"),
-        field("speed_mps", _F8, "m/s", "approach speed V"),
-        field("angle_deg", _F8, "deg", "approach angle phi above the horizontal"),
+        shared("vehicle", _NAME),
+        shared("gear_set", _NAME),
+        shared("gear", _NAME),
+        shared("learner", _NAME),
+        shared("speed_mps", _F8),
+        shared("angle_deg", _F8),
     ]
 
 
 def _trial_key() -> list[pa.Field]:
-    return [*_cell(), field("trial", _I4, "1", "number of the trial in its cell")]
+    return [*_cell(), shared("trial", _I4)]
 
 
 def _trigger(doc: str) -> list[pa.Field]:
@@ -151,18 +150,18 @@ def _rates(doc: str) -> list[pa.Field]:
 def _trials(layout: Layout) -> Iterable[pa.Field]:
     recent = "over the last three episodes"
     yield from _trial_key()
-    yield field("run_seed", _I8, "1", "seed of the trial: `ivl learn --seed` with it repeats the trial")
+    yield shared("run_seed", _I8)
     yield field(
         "seed",
         _I8,
         "1",
         "seed of the world's random numbers, the same for every learner; with `stream` it names a rollout",
     )
-    yield field("learner_seed", _I8, "1", "seed of the learner")
+    yield shared("learner_seed", _I8)
     yield field("n_rollouts", _I4, "1", "rollouts flown")
-    yield field("n_episodes", _I4, "1", "episodes flown")
+    yield shared("n_episodes", _I4)
     yield field("n_discarded", _I4, "1", "rollouts that the simulation could not bring to an end; not learned from")
-    yield field("stopped", pa.bool_(), "1", "whether the learner itself ended the trial")
+    yield shared("stopped", pa.bool_())
     yield from _rates(recent)
     yield field("n_recent", _I4, "1", f"rollouts that count {recent}")
     yield field("reward_mean", _F8, "1", f"mean return {recent}")
@@ -191,8 +190,8 @@ def _trials(layout: Layout) -> Iterable[pa.Field]:
 
 def _episodes(layout: Layout) -> Iterable[pa.Field]:
     yield from _trial_key()
-    yield field("episode", _I4, "1", "number of the episode, from 0")
-    yield field("n_scored", _I4, "1", "rollouts that were learned from")
+    yield shared("episode", _I4)
+    yield shared("n_scored", _I4)
     yield from _policy(layout, "mu", "centre of the search after the episode")
     yield from _policy(layout, "sigma", "spread of the search after the episode")
     yield from _policy(layout, "recommended", "policy recommended after the episode")
@@ -203,10 +202,10 @@ def _episodes(layout: Layout) -> Iterable[pa.Field]:
 
 def _rollouts(layout: Layout) -> Iterable[pa.Field]:
     yield from _trial_key()
-    yield field("episode", _I4, "1", "number of the episode, from 0")
-    yield field("idx", _I4, "1", "place within the episode")
+    yield shared("episode", _I4)
+    yield shared("idx", _I4)
     yield field("seed", _I8, "1", "seed of the world's random numbers")
-    yield field("stream", _I8, "1", "number of the rollout within the seed")
+    yield shared("stream", _I8)
     yield from _policy(layout, "", "policy as flown")
     yield field("scored", pa.bool_(), "1", "false: the simulation could not bring it to an end, not learned from")
     yield field("reward", _F8, "1", "return; NaN if not scored")

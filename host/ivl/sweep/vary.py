@@ -1,6 +1,6 @@
 """Values of varied paths: as lists in a file, after `--vary a.b=x,y`, and as text in names and tables."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeGuard
 
@@ -114,9 +114,6 @@ def refuse_varied(data: dict[str, Any], name: str, what: str) -> None:
 
 def apply_vary(data: dict[str, Any], vary: Sequence[str], label: str) -> None:
     """Write the texts of `--vary` into raw data, in place of what the file says of the same paths."""
-    before = data.get("vary") or {}
-    if not isinstance(before, dict):
-        raise ConfigError(f"{label}: vary: value {before!r}: expected a mapping from path to values")
     given: dict[str, Any] = {}
     for text in vary:
         name, equals, rest = text.partition("=")
@@ -127,9 +124,23 @@ def apply_vary(data: dict[str, Any], vary: Sequence[str], label: str) -> None:
             raise ConfigError(f"{label}: --vary {text}: {name} is given twice")
         found = yamlfile.parse(f"[{rest}]", f"{label}: --vary {text}")
         given[name] = found[0] if len(found) == 1 and isinstance(found[0], (dict, list)) else found
-        if name in references.FIELDS and isinstance(given[name], list):
-            given[name] = [references.absolute(value, Path.cwd()) for value in given[name]]
+    put_varied(data, given, label)
+
+
+def put_varied(data: dict[str, Any], given: Mapping[str, Any], label: str) -> None:
+    """Write values of varied paths into raw data, in place of what it says of the same paths.
+
+    Raises:
+        ConfigError: What the data says of varied paths is no mapping.
+    """
+    before = data.get("vary") or {}
+    if not isinstance(before, dict):
+        raise ConfigError(f"{label}: vary: value {before!r}: expected a mapping from path to values")
+    found = dict(given)
+    for name, values_of_path in given.items():
+        if name in references.FIELDS and isinstance(values_of_path, list):
+            found[name] = [references.absolute(value, Path.cwd()) for value in values_of_path]
         for same in (name, AXES[name]) if name in AXES else ():
             data.pop(same, None)
-    if given:
-        data["vary"] = {**before, **given}
+    if found:
+        data["vary"] = {**before, **found}
