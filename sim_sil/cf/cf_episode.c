@@ -67,10 +67,10 @@ static bool put_to_start(ivl_cf_t *cf)
 }
 
 /// Voltage of the battery that drives the rotors, under their load; 0: a supply that never sags.
-static float rotor_V(ivl_cf_t *cf)
+static float rotor_V(const ivl_cf_t *cf)
 {
-    const ivl_sim_rotor_t *rotor = &ivl_cf_world(cf)->rotor;
-    return (rotor->open_circuit_V > 0.0) ? (float)ivl_sim_rotor_voltage(&cf->model, rotor) : 0.0f;
+    const ivl_sim_rotors_t *rotors = &cf->group.rotor;
+    return (rotors->open_circuit_V[IVL_CF_LANE] > 0.0) ? (float)ivl_sim_rotor_voltage(&cf->model, rotors, IVL_CF_LANE) : 0.0f;
 }
 
 void ivl_cf_episode_begin(ivl_cf_t *cf)

@@ -45,8 +45,8 @@ class Script:
     def change_battery(self, battery_V: float, needed_V: float) -> None:
         raise AssertionError(f"battery {battery_V}, needed {needed_V}")
 
-    def help(self, cause: Cause, text: str) -> None:
-        raise AssertionError(f"{cause}: {text}")
+    def help(self, cause: Cause) -> None:
+        raise AssertionError(cause)
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
         assert resting.p_W_m[2] < 0.2, "it stands on the floor"

@@ -60,8 +60,7 @@ class Script:
         self.asked.append(f"battery {battery_V:.1f}")
         self.on_battery()
 
-    def help(self, cause: Cause, text: str) -> None:
-        assert text
+    def help(self, cause: Cause) -> None:
         self.asked.append(f"help {cause}")
         self.on_help(cause)
 

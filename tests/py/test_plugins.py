@@ -171,7 +171,7 @@ def test_an_installed_package_gives_more_by_entry_points(
     [
         ({"reward": "ivl_of_a_user:feat"}, "ivl_of_a_user has no 'feat', did you mean 'feet'"),
         ({"reward": "ivl_of_a_user:number"}, "is of the kind int, expected a Reward or a function of outcomes"),
-        ({"reward": "ivl_of_a_user:negative"}, "is negative"),
+        ({"reward": "ivl_of_a_user:negative"}, "is out of range"),
         ({"reward": "ivl_of_a_user:short"}, r"shape \(1,\) \(expected \(4,\)"),
         ({"reward": "ivl_of_a_user"}, "no reward 'ivl_of_a_user'"),
         ({"reward": "../x:y"}, "expected module:name"),

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from pydantic import BaseModel
 
 from ivl import forms, outcome, tracefile, yamlfile
 from ivl.api.runs import LearnRun, load
@@ -68,7 +69,7 @@ def rollout(
     if run_folder is not None:
         policy_options.only("--run", run_folder, policy=policy_file, experiment=chosen.path, **said)
     name = form or forms.PAPER
-    bases: Sequence[Task] = ()
+    bases: Sequence[BaseModel] = ()
     if run_folder is not None:
         spec = _of_run(run_folder)
         policy: dict[str, Any] = {"form": spec.form, "theta": spec.theta}

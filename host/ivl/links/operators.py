@@ -85,8 +85,8 @@ class Operator(Protocol):
         """Return when the battery has been changed."""
         ...
 
-    def help(self, cause: Cause, text: str) -> None:
-        """Return when what the state of this cause asks for has been done."""
+    def help(self, cause: Cause) -> None:
+        """Return when what the state of this cause asks for has been done; what has happened was told before."""
         ...
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
@@ -198,10 +198,8 @@ class ConsoleOperator:
         """Show the flight, ask, then count down."""
         theta = upcoming.form.describe(upcoming.theta)
         self._tell(f"NEXT: rollout {upcoming.number} of {upcoming.n_all}: {theta}; {upcoming.forecast}.")
-        self._tell(
-            "Vehicle upright at home ({:.2f}, {:.2f}) m; ".format(*upcoming.home_W_m)
-            + "it will hover at ({:.2f}, {:.2f}, {:.2f}) m. Everybody outside, net closed.".format(*upcoming.start_W_m)
-        )
+        home, start = (", ".join(f"{v:z.2f}" for v in place) for place in (upcoming.home_W_m, upcoming.start_W_m))
+        self._tell(f"Vehicle upright at home ({home}) m; it will hover at ({start}) m. Everybody outside, net closed.")
         answer = self._ask("arm and fly?", [f"fly {upcoming.number}", "veto", "instead"])
         if answer == "veto":
             raise Vetoed("vetoed by the operator")
@@ -216,11 +214,9 @@ class ConsoleOperator:
         self._tell(f"BATTERY: {battery_V:.2f} V, needed {needed_V:.2f} V; the same policy is next.")
         self._ask(f"{state_of(Cause.BATTERY).asks}, then", ["changed"])
 
-    def help(self, cause: Cause, text: str) -> None:
-        """Tell, and ask."""
-        state = state_of(cause)
-        self._tell(f"{cause.upper()}: {text}")
-        self._ask(f"{state.asks}, then", ["go on"])
+    def help(self, cause: Cause) -> None:
+        """Ask."""
+        self._ask(f"{cause.upper()}: {state_of(cause).asks}, then", ["go on"])
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
         """Ask for legs and body contact; what the pose suggests is shown."""

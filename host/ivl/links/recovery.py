@@ -81,7 +81,7 @@ class AskOperator:
         cause = cause_of(error)
         self._say(f"{cause}: {error}; the same policy is next")
         if state_of(cause).asks:
-            self._operator.help(cause, str(error))
+            self._operator.help(cause)
 
     def told(self, troubles: "Counter[Cause]") -> str:
         """How often each happened."""

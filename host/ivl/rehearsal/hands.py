@@ -26,10 +26,10 @@ class Hands:
             self._person.change_battery(battery_V, needed_V)
         self._day.change_battery()
 
-    def help(self, cause: Cause, text: str) -> None:
+    def help(self, cause: Cause) -> None:
         """Mend what this cause asks for."""
         if self._person is not None:
-            self._person.help(cause, text)
+            self._person.help(cause)
         self._day.mend(cause)
 
     def confirm(self, suggested: Seen, resting: Resting, note: str) -> Seen:
