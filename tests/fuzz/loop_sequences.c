@@ -7,7 +7,7 @@
 /// - no motor turns in a phase whose motors are off;
 /// - IDLE is obeyed in every phase and ABORT before the trigger, at once, if the link lets them through;
 /// - a policy in force changes in IDLE and READY alone, a configuration in IDLE alone;
-/// - when all clients have gone, the next one is answered within a minute, whatever they have set.
+/// - when all clients have gone, the next one is answered within what their faults may last together, whatever they have set.
 ///
 /// The loop is the real one, with the vehicle behind it; sockets and clock are made here.
 #include <math.h>
@@ -40,7 +40,8 @@ enum
     TAGS = 4000,     ///< commands and policies of a sequence
     ANSWER_MS = 30,  ///< of the vehicle
     SURE_US = 900000,
-    AWAY_US_MAX = 62000000
+    // a freeze and a cut of a minute each, one after the other, packets that are delayed by 20 s both ways, and the silence of the one who has gone
+    AWAY_US_MAX = 162000000
 };
 
 typedef enum
@@ -266,7 +267,7 @@ static void hear_answer(int client, const uint8_t *bytes, size_t size)
     const uint8_t port = (uint8_t)(bytes[0] >> 4);
     const bool    says_something = (size > 1u) && (port != IVL_CRTP_PORT_CONSOLE) && (port != IVL_CRTP_PORT_LINK);
     around.n_answers[client]++;
-    const bool is_sure = (model.holder != UNSURE) && is_clear() && (around.now_us < model.heard_us + SURE_US);
+    const bool is_sure = (model.holder >= 0) && around.is_open[model.holder] && is_clear() && (around.now_us < model.heard_us + SURE_US);
     must(!says_something || (model.holder == client) || !is_sure, "an answer goes to a stranger");
 }
 
@@ -557,6 +558,7 @@ static void happen(const event_t *e)
         model.stop_ms = (model.holder == client) ? -1 : model.stop_ms;
         break;
     case NOTHING:
+        around.is_open[client] = true;
         if (model.holder == client)
         {
             model.heard_us = around.now_us;
