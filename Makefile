@@ -92,9 +92,9 @@ wheel: setup-dev toolchain ## wheels in build/wheels that need no compiler: for 
 test-wheel: setup-dev build ## the wheels in fresh environments without compiler and repository; aarch64 under qemu-user (WHEEL_ARGS='--python python3.13')
 	@tools/apt_install.sh aarch64-linux-gnu-gcc:gcc-aarch64-linux-gnu :libc6-dev-arm64-cross qemu-aarch64:qemu-user
 	$(say) 'test-wheel: installed, and used'
-	@$(BIN)/python tools/test_wheel.py $(WHEEL_ARGS)
+	@$(within) $(BIN)/python tools/test_wheel.py $(WHEEL_ARGS)
 	$(say) 'test-wheel: aarch64, emulated'
-	@$(BIN)/python tools/test_wheel.py --machine aarch64
+	@$(within) $(BIN)/python tools/test_wheel.py --machine aarch64
 
 .PHONY: example-cpp
 example-cpp: golden-build-O0 ## the flight core in a bare C loop and in a C++ module, compiled and flown (docs/PORTING.md)

@@ -127,8 +127,9 @@ def test_emulated(wheel: Path) -> None:
         if found.tobytes() != expected.tobytes():
             n = sum(a.tobytes() != b.tobytes() for a, b in zip(found, expected, strict=True))
             sys.exit(f"test_wheel: {n} of {N_LANDINGS} landings have other bits on aarch64")
-        server = subprocess.run([*emulator, str(native_folder / "ivl_sil"), "--help"], capture_output=True, text=True,
-                                check=False)  # fmt: skip
+        program = native_folder / "ivl_sil"
+        program.chmod(0o755)  # pip keeps the mode of a file, zipfile does not
+        server = subprocess.run([*emulator, str(program), "--help"], capture_output=True, text=True, check=False)
         if "usage" not in (server.stdout + server.stderr).lower():
             sys.exit(f"test_wheel: ivl_sil does not start: {server.stderr}")
     print(

@@ -176,7 +176,7 @@ def test_missing_package_is_told(
     for name in [name for name in sys.modules if name.startswith("ivl.flight")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    words = ["flight", "import", str(july), "--format", "ivl", "--out", str(tmp_path / "out")]
+    words = ["flight", "import", str(july), "--format", "habas2021", "--out", str(tmp_path / "out")]
     assert cli.run(words) == 1
     assert capsys.readouterr().err == "ivl: pyarrow is not installed: pip install 'ivl[flight]'\n"
     assert cli.run(["flight", "show", str(tmp_path)]) == 1

@@ -135,7 +135,7 @@ def test_failure_while_writing_leaves_nothing(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(store.pq, "write_table", full)
+    monkeypatch.setattr("pyarrow.parquet.write_table", full)
     with pytest.raises(ConfigError, match=r"out: cannot be written: No space left on device"):
         store.write(tmp_path / "out", flights)
     assert list(tmp_path.iterdir()) == []
@@ -148,7 +148,7 @@ def test_interrupted_import_leaves_nothing(truth: Truth, tmp_path: Path, monkeyp
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(store.pq, "write_table", interrupt)
+    monkeypatch.setattr("pyarrow.parquet.write_table", interrupt)
     out = str(tmp_path / "out")
     assert cli.run(["flight", "import", str(path), "--format", "habas2021", "--out", out]) == 130
     assert list(tmp_path.iterdir()) == [path]
@@ -158,8 +158,8 @@ def test_killed_import_leaves_no_folder_of_that_name(truth: Truth, tmp_path: Pat
     path = tmp_path / "july.csv"
     path.write_bytes(habas_text(habas_rows(truth)).encode())
     program = (
-        "import os, signal, sys; from ivl import cli; from ivl.flight import store; "
-        "store.pq.write_table = lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL); cli.run(sys.argv[1:])"
+        "import os, signal, sys; from ivl import cli; import pyarrow.parquet; "
+        "pyarrow.parquet.write_table = lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL); cli.run(sys.argv[1:])"
     )
     words = ["flight", "import", str(path), "--format", "habas2021", "--out", str(tmp_path / "out")]
     assert subprocess.run([sys.executable, "-c", program, *words], check=False).returncode == -signal.SIGKILL

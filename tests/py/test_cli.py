@@ -112,7 +112,10 @@ def test_rollout_refuses_wrong_arguments_in_one_line(capsys: Capture, extra: lis
 
 def test_list_names_everything(capsys: Capture) -> None:
     data = json_of(["list"], capsys)
-    assert set(data) == {"vehicles", "gears", "sensors", "experiments", "learners", "rewards", "forms"}
+    assert set(data) == {
+        "vehicles", "gears", "sensors", "experiments", "tasks", "sweeps", "approaches", "estimators", "params",
+        "learners", "rewards", "forms",
+    }  # fmt: skip
     assert {"ideal", "mocap", "camera50", "ranger10"} <= {entry["name"] for entry in data["sensors"]}
     assert {entry["name"] for entry in data["vehicles"]} == {"habas2021", "crazyflie21", "crazyflie21_brushless"}
     assert len(data["gears"]) == 12

@@ -30,8 +30,8 @@ Meta = Mapping[str, npt.NDArray[Any]]
 LANDED = "landed"
 """Name in `Meta` under which a learner is told which rollouts were landings (`ivl.outcome.four_leg`)."""
 RETURN_MIN, RETURN_MAX = 1e-30, 1e30
-"""Returns are 0 or within this range, policies within so many spreads of the first centre: squares of either, and sums
-of them, are then numbers, whatever a learner does with them."""
+"""Smaller returns count as 0, larger ones are refused, and so are policies beyond so many spreads of the first centre:
+squares of either, and sums of them, are then numbers, whatever a learner does with them."""
 SPREADS_MAX = 1e6
 RECORDING = "recording"
 """Name in `Meta` of what rollouts recorded of their flip, shape (n, `ivl.belief.recording.N`), NaN where nothing."""
@@ -141,7 +141,7 @@ class Learner(ABC):
 
         Args:
             theta: Policies as flown, shape (n, dim).
-            rewards: Return of each, shape (n,), 0 or 1e-30 .. 1e30, to be maximised.
+            rewards: Return of each, shape (n,), 0 .. 1e30, to be maximised; below 1e-30 it counts as 0.
             meta: More about each rollout by name (fields of its outcome, and `LANDED`), each of shape (n, ...);
                 learners may use or ignore it.
 
@@ -154,6 +154,7 @@ class Learner(ABC):
                 f"tell: theta has shape {x.shape} and rewards {r.shape}, expected (n, {self.dim}) and (n,)"
             )
         self._check_told(x, r)
+        r = np.where(r < RETURN_MIN, 0.0, r)
         extra = {name: np.array(value) for name, value in (meta or {}).items()}
         for name, value in extra.items():
             if value.shape[:1] != r.shape:
@@ -194,11 +195,9 @@ class Learner(ABC):
             raise LearnerError(f"the saved state of {type(self).__name__} is damaged: {error!r}") from error
 
     def _check_told(self, x: FloatArray, r: FloatArray) -> None:
-        odd = r[(r < 0) | (r > RETURN_MAX) | ((r > 0) & (r < RETURN_MIN))]
+        odd = r[(r < 0) | (r > RETURN_MAX)]
         if odd.size:
-            raise LearnerError(
-                f"tell: rewards: value {float(odd[0])!r} is out of range (allowed 0, {RETURN_MIN:g} .. {RETURN_MAX:g})"
-            )
+            raise LearnerError(f"tell: rewards: value {float(odd[0])!r} is out of range (allowed 0 .. {RETURN_MAX:g})")
         row, column = np.nonzero(np.abs(x - self.mu0) > SPREADS_MAX * self.sigma0)
         if row.size:
             raise LearnerError(
