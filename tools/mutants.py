@@ -321,10 +321,18 @@ def recipe(makefile: tuple[str, ...], path: str, targets: tuple[str, ...]) -> tu
     return commands, [TREE / line[line.index("-o") + 1] for line in words]
 
 
+@functools.cache
+def build_libraries() -> None:
+    """Build all libraries of the copy without a fault: what a change of a source means is told of what is there."""
+    if run([*MAKE, *NATIVE, *LIBRARIES]) != 0:
+        raise SystemExit(f"mutants: {', '.join(LIBRARIES)}: cannot be built")
+
+
 def recipes(area: Area, path: str) -> dict[str, tuple[list[str], list[Path]]]:
     """How a source is built again: into the libraries, if a test links them, and into each test of the app."""
     found = {}
     if any(test not in APP_TESTS for test in programs(area)):
+        build_libraries()
         found["libraries"] = recipe(tuple(NATIVE), path, tuple(LIBRARIES))
     for test in APP_TESTS:
         if test in area.tests:

@@ -77,9 +77,7 @@ def test_request_that_makes_no_sense_ends_the_program(build: Path, recorded: Rec
     program = build / "replay.elf"
     request = layout.dtype(program, "ivl_port_request_t")
     asked = np.frombuffer(recorded.requests.read_bytes(), request)
-    later = int(
-        np.argmax(asked["operation"] != asked["operation"][0])
-    )  # the first ones start slots: any will do
+    later = int(np.argmax(asked["operation"] != asked["operation"][0]))  # the first ones start slots: any will do
     good = asked[[0, 1, later]]
     for field, value in (("operation", 9), ("slot", 16), ("slot", 15)):
         bad = good.copy()
