@@ -110,7 +110,7 @@ class Machine(RuleBasedStateMachine):
         is_clients = is_free or client == self.holder
         if self.gateways.host._udp is None:  # the link is down: the port is closed
             return False
-        if is_clients:
+        if is_clients and 1 <= len(packet) <= gateway.PACKET_MAX:  # what is no packet makes nobody the client
             self.holder, self.t_heard_s = client, now_s
         played["strangers"] += not is_clients
         self.sent[packet] = (now_s, is_clients or self.sent.get(packet, (0.0, False))[1])
