@@ -179,7 +179,6 @@ def test_missing_package_is_told(
     words = ["flight", "import", str(july), "--format", "habas2021", "--out", str(tmp_path / "out")]
     assert cli.run(words) == 1
     assert capsys.readouterr().err == "ivl: pyarrow is not installed: pip install 'ivl[flight]'\n"
-    assert cli.run(["flight", "show", str(tmp_path)]) == 1
 
 
 @pytest.mark.parametrize("words", [["import"], ["show"]])
