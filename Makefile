@@ -278,7 +278,7 @@ test-forms: setup-dev test-c firmware pil-unity-stm32-Os ## forms of a policy th
 .PHONY: test-wire
 test-wire: setup-dev build ## CRTP over a CAN bus, and motion capture
 	$(say) 'test-wire: pytest tests/wire'
-	@$(BIN)/python -m pytest tests/wire --ignore tests/wire/test_can_sequences.py $(PYTEST_ARGS)  # sequences: minutes; make reliability
+	@$(BIN)/python -m pytest tests/wire $(PYTEST_ARGS)
 
 .PHONY: test-physics
 test-physics: setup-dev build ## landings with known properties, and a sample of the step-size study
