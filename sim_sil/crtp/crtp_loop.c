@@ -109,10 +109,15 @@ static void meet_foreigner(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
     }
 }
 
-// The radio's processor acknowledges each of its packets, whoever sends them.
+// The radio's processor acknowledges the packets of the client, and of anybody if there is none.  They take no place, and keep none.
 static void switch_power(ivl_crtp_loop_t *loop, const ivl_crtp_datagram_t *d)
 {
     ivl_crtp_packet_t reply;
+    if (!ivl_crtp_session_may(&loop->session, loop->now_us, d))
+    {
+        meet_foreigner(loop, d);
+        return;
+    }
     ivl_crtp_power(&loop->crtp, d->bytes, d->size, &reply);
     send_to(loop, d->peer, &reply);
 }
@@ -162,7 +167,11 @@ static void look_after_client(ivl_crtp_loop_t *loop)
     {
         probe_client(loop, PROBE_US);
     }
-    if (ivl_crtp_session_next(&loop->session, &d))
+    if (ivl_crtp_session_is_pressed(&loop->session, loop->now_us))
+    {
+        probe_client(loop, MEET_US);
+    }
+    if (ivl_crtp_session_next(&loop->session, loop->now_us, &d))
     {
         arrive(loop, &d);
     }

@@ -7,12 +7,14 @@
 #include "crtp_faults.h"
 
 #define IVL_CRTP_SILENCE_US 1000000u
+#define IVL_CRTP_SWITCH_US 200000u  ///< a request to switch the power waits so long for the client to be known to have gone, and no longer
 
 typedef struct
 {
     bool                live;
     uint64_t            peer, heard_us;
-    bool                is_waited_for;  ///< somebody else wants to connect; his request is kept
+    bool                is_waited_for;  ///< somebody else wants something; his request is kept
+    uint64_t            waits_until_us;
     ivl_crtp_datagram_t waiting;
 } ivl_crtp_session_t;
 
@@ -30,6 +32,13 @@ bool ivl_crtp_is_link_source(const ivl_crtp_datagram_t *datagram);
 /// A packet that says something has come.
 ivl_crtp_who_t ivl_crtp_session_hear(ivl_crtp_session_t *session, uint64_t now_us, const ivl_crtp_datagram_t *datagram);
 
+/// Whether the sender of a packet that takes no place, as those that switch the power, may be obeyed: he is the client, or there is none.  Another
+/// one's packet waits for a moment, since a client who has just closed his socket is not yet known to be gone; if he is silent it waits for his end.
+bool ivl_crtp_session_may(ivl_crtp_session_t *session, uint64_t now_us, const ivl_crtp_datagram_t *datagram);
+
+/// Such a packet waits: the client is to be asked whether he is still there.
+bool ivl_crtp_session_is_pressed(const ivl_crtp_session_t *session, uint64_t now_us);
+
 /// The client has not spoken for a second.
 bool ivl_crtp_session_is_silent(const ivl_crtp_session_t *session, uint64_t now_us);
 
@@ -40,6 +49,6 @@ bool ivl_crtp_session_expire(ivl_crtp_session_t *session, uint64_t now_us, bool 
 /// Nobody listens at this address.  @return true if it was the client's, who is given up
 bool ivl_crtp_session_gone(ivl_crtp_session_t *session, uint64_t peer);
 
-/// The request of the one who waited, if the vehicle is free.
-bool ivl_crtp_session_next(ivl_crtp_session_t *session, ivl_crtp_datagram_t *datagram);
+/// The request of the one who waited, if the vehicle is free and the request has not waited too long.
+bool ivl_crtp_session_next(ivl_crtp_session_t *session, uint64_t now_us, ivl_crtp_datagram_t *datagram);
 #endif  // IVL_CRTP_SESSION_H

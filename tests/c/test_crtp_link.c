@@ -10,6 +10,8 @@
 static ivl_crtp_faults_t  faults;
 static ivl_crtp_session_t session;
 
+#define LATE_US 3600000000u
+
 void setUp(void)
 {
     ivl_crtp_faults_init(&faults);
@@ -201,7 +203,7 @@ static void test_the_first_has_the_vehicle_until_he_is_silent(void)
     TEST_ASSERT_TRUE(ivl_crtp_session_expire(&session, 1900001, false));
     TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 9900001, false));
     // what was no request to connect is not done later
-    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, LATE_US, &d));
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_NEW, hear(2, 0x3c, 2000000));
 }
 
@@ -217,7 +219,7 @@ static void test_who_is_there_keeps_it_in_silence_until_another_comes(void)
     TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 10000001, true));
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_FOREIGN, hear(2, 0x2c, 10000001));
     TEST_ASSERT_TRUE(ivl_crtp_session_expire(&session, 10000002, true));
-    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, LATE_US, &d));
     TEST_ASSERT_EQUAL_UINT64(2, d.peer);
 }
 
@@ -230,7 +232,7 @@ static void test_nobody_takes_it_from_one_who_spoke_while_nobody_listened(void)
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_CLIENT, hear(1, 0x2c, 5000000));
     TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 5000000, true));
     TEST_ASSERT_TRUE(ivl_crtp_session_gone(&session, 1));
-    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, LATE_US, &d));
 }
 
 static void test_who_is_silent_gives_way_to_one_who_has_asked(void)
@@ -240,8 +242,68 @@ static void test_who_is_silent_gives_way_to_one_who_has_asked(void)
     (void)hear(2, 0xfd, 500000);
     TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 1000000, true));
     TEST_ASSERT_TRUE(ivl_crtp_session_expire(&session, 1000001, true));
-    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, LATE_US, &d));
     TEST_ASSERT_EQUAL_UINT64(2, d.peer);
+}
+
+static ivl_crtp_datagram_t power_packet(uint64_t peer)
+{
+    return (ivl_crtp_datagram_t){.peer = peer, .size = 3, .bytes = {0xff, 0xfe, 0x02}};
+}
+
+static void test_the_power_is_the_clients_or_nobodys(void)
+{
+    const ivl_crtp_datagram_t own = power_packet(1), other = power_packet(2);
+    ivl_crtp_datagram_t       d;
+    TEST_ASSERT_TRUE(ivl_crtp_session_may(&session, 0, &other));
+    TEST_ASSERT_FALSE(session.live);
+    (void)hear(1, 0xfd, 0);
+    TEST_ASSERT_TRUE(ivl_crtp_session_may(&session, 10, &own));
+    TEST_ASSERT_FALSE(ivl_crtp_session_may(&session, 10, &other));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, 10, &d));
+    // who speaks has not gone
+    (void)hear(1, 0x2c, 20);
+    TEST_ASSERT_TRUE(ivl_crtp_session_gone(&session, 1));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, 20, &d));
+}
+
+static void test_a_refused_switch_waits_for_a_moment_only(void)
+{
+    const ivl_crtp_datagram_t other = power_packet(2), third = power_packet(3);
+    ivl_crtp_datagram_t       d;
+    (void)hear(1, 0xfd, 0);
+    TEST_ASSERT_FALSE(ivl_crtp_session_may(&session, 10, &other));
+    TEST_ASSERT_FALSE(ivl_crtp_session_may(&session, 11, &third));
+    TEST_ASSERT_TRUE(ivl_crtp_session_is_pressed(&session, 10 + IVL_CRTP_SWITCH_US));
+    TEST_ASSERT_FALSE(ivl_crtp_session_is_pressed(&session, 11 + IVL_CRTP_SWITCH_US));
+    TEST_ASSERT_TRUE(ivl_crtp_session_gone(&session, 1));
+    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, 10 + IVL_CRTP_SWITCH_US, &d));
+    TEST_ASSERT_EQUAL_UINT64(2, d.peer);
+
+    (void)hear(1, 0xfd, 100000);
+    TEST_ASSERT_FALSE(ivl_crtp_session_may(&session, 100000, &other));
+    // it is no reason to take the vehicle from one who is silent later
+    TEST_ASSERT_FALSE(ivl_crtp_session_expire(&session, 1200000, true));
+    TEST_ASSERT_TRUE(ivl_crtp_session_gone(&session, 1));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, 100001 + IVL_CRTP_SWITCH_US, &d));
+}
+
+static void test_one_who_is_silent_keeps_nobody_from_the_switch(void)
+{
+    const ivl_crtp_datagram_t other = power_packet(2);
+    ivl_crtp_datagram_t       d;
+    (void)hear(1, 0xfd, 0);
+    TEST_ASSERT_FALSE(ivl_crtp_session_may(&session, 1000001, &other));
+    TEST_ASSERT_TRUE(ivl_crtp_session_expire(&session, 1000001, true));
+    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, LATE_US, &d));
+    // but who wants to connect goes first
+    (void)hear(1, 0xfd, 2000000);
+    (void)hear(3, 0xfd, 2000001);
+    TEST_ASSERT_FALSE(ivl_crtp_session_is_pressed(&session, 2000002));
+    TEST_ASSERT_FALSE(ivl_crtp_session_may(&session, 3000001, &other));
+    TEST_ASSERT_TRUE(ivl_crtp_session_gone(&session, 1));
+    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, LATE_US, &d));
+    TEST_ASSERT_EQUAL_UINT64(3, d.peer);
 }
 
 static void test_who_asks_to_connect_is_next(void)
@@ -251,12 +313,12 @@ static void test_who_asks_to_connect_is_next(void)
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_FOREIGN, hear(2, 0xfd, 1));
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_FOREIGN, hear(3, 0xf1, 2));
     TEST_ASSERT_EQUAL_INT(IVL_CRTP_FOREIGN, hear(2, 0x2c, 3));
-    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, LATE_US, &d));
     TEST_ASSERT_FALSE(ivl_crtp_session_gone(&session, 9));
     TEST_ASSERT_TRUE(ivl_crtp_session_gone(&session, 1));
-    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_TRUE(ivl_crtp_session_next(&session, LATE_US, &d));
     TEST_ASSERT_EQUAL_UINT64(3, d.peer);
-    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, LATE_US, &d));
 }
 
 static void test_who_has_gone_meanwhile_is_not_next(void)
@@ -267,7 +329,7 @@ static void test_who_has_gone_meanwhile_is_not_next(void)
     TEST_ASSERT_FALSE(ivl_crtp_session_gone(&session, 2));
     TEST_ASSERT_TRUE(session.live);
     TEST_ASSERT_TRUE(ivl_crtp_session_gone(&session, 1));
-    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, &d));
+    TEST_ASSERT_FALSE(ivl_crtp_session_next(&session, LATE_US, &d));
 }
 
 // ---- time
@@ -347,6 +409,9 @@ int main(void)
     RUN_TEST(test_who_is_there_keeps_it_in_silence_until_another_comes);
     RUN_TEST(test_who_is_silent_gives_way_to_one_who_has_asked);
     RUN_TEST(test_nobody_takes_it_from_one_who_spoke_while_nobody_listened);
+    RUN_TEST(test_the_power_is_the_clients_or_nobodys);
+    RUN_TEST(test_a_refused_switch_waits_for_a_moment_only);
+    RUN_TEST(test_one_who_is_silent_keeps_nobody_from_the_switch);
     RUN_TEST(test_who_asks_to_connect_is_next);
     RUN_TEST(test_who_has_gone_meanwhile_is_not_next);
     RUN_TEST(test_paced_time_does_not_drift);

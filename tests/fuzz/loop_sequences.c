@@ -2,7 +2,8 @@
 /// Random sequences of what clients, an operator and a bad link can do to the software vehicle through its server's loop, and what must hold
 /// after each millisecond of the vehicle:
 ///
-/// - who has the vehicle keeps it: nothing that another one sends meanwhile is obeyed or put in force, and answers go to nobody else;
+/// - who has the vehicle keeps it: nothing that another one sends meanwhile is obeyed or put in force, not even by the radio's processor, and
+///   answers go to nobody else;
 /// - a flip has a policy, a request of somebody who had the vehicle, and the policy's region; it begins from READY, or on a simulated path;
 /// - no motor turns in a phase whose motors are off;
 /// - IDLE is obeyed in every phase and ABORT before the trigger, at once, if the link lets them through;
@@ -54,14 +55,15 @@ typedef enum
     COMMAND,  // a: client, b: request
     WRITE,    // a: client and parameter, b: value
     NOISE,    // a: client, b: seed
+    POWER,    // a: client, b: which; only from a stranger: it must not be obeyed
     CONTROL,  // a: which line
     SILENCE,  // longer than a client may be silent
     TRAITOR,  // only with --traitor: the loop takes a stranger for the client
     EVENTS
 } kind_t;
 
-static const char *const NAMES[EVENTS] = {"wait",  "connect", "close",   "nothing", "policy", "command",
-                                          "write", "noise",   "control", "silence", "traitor"};
+static const char *const NAMES[EVENTS] = {"wait",  "connect", "close", "nothing", "policy",  "command",
+                                          "write", "noise",   "power", "control", "silence", "traitor"};
 
 static bool has_traitor;
 
@@ -520,6 +522,21 @@ static void control(uint8_t a)
     put(CONTROL_FD, IVL_CRTP_UDP_PACKET, 5u, line, strlen(line));
 }
 
+/// The model knows nothing of a vehicle without power: only what is sure to be refused is sent.
+static void ask_for_power(int client, uint8_t which)
+{
+    static const uint8_t PACKETS[3][3] = {{0xffu, 0xfeu, 0x02u}, {0xf3u, 0xfeu, 0x01u}, {0xffu, 0xfeu, 0xffu}};
+    const uint8_t       *packet = PACKETS[which % 3u];
+    const bool           is_heard = (model.holder >= 0) && around.is_open[model.holder] && (around.now_us < model.heard_us + SURE_US);
+    if (is_heard && (model.holder != client) && is_clear() && (loop.session.peer == peer_of(model.holder)))
+    {
+        n_strangers++;
+        send(client, packet[0], packet + 1, 2u);
+        let_pass_us(1500u);
+        must(!loop.crtp.is_off, "a stranger switches the power");
+    }
+}
+
 static void connect(int client)
 {
     static const uint8_t LINK_SOURCE[] = {0xf1u};
@@ -576,6 +593,9 @@ static void happen(const event_t *e)
         break;
     case NOISE:
         send_noise(client, e->b);
+        break;
+    case POWER:
+        ask_for_power(client, e->b);
         break;
     case CONTROL:
         control(e->a);

@@ -106,6 +106,25 @@ def test_silence_over_a_bad_link_is_a_lost_link(sil, Raw, wait_for):
         wait_for("the end of the link", lambda: sil.get("radio.isConnected") == 0)
 
 
+def test_only_the_client_switches_the_power_and_anybody_if_there_is_none(sil, Raw, wait_for):
+    with Raw(sil.uri) as client, Raw(sil.uri) as other:
+        client.connect()
+        for packet in ("fffe02", "f3fe01", "fffef001", "fffeff"):
+            client.ask("fc00")
+            other.send(packet)
+        wait_for("all to be seen", lambda: sil.get("sil.n_foreign") == 4)
+        assert other.silent()
+        assert client.ask("fc0011") == bytes.fromhex("fc0011")
+        client.send("fffe02")
+        wait_for("the vehicle to be off", lambda: sil.get("radio.isConnected") == 0)
+        client.send("fffe03")
+        client.connect()
+    # as cflib's PowerSwitch does it: a socket of its own, at once after the client's was closed
+    with Raw(sil.uri) as other:
+        other.send("fffeff")
+        assert other.receive(null=True)[:3] == bytes.fromhex("fffeff")
+
+
 def test_eight_vehicles_at_once(world, connected):
     with SilProcess(world, vehicles=8, seed=3) as sil:
         assert len(set(sil.uris)) == 8
