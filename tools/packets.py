@@ -3,25 +3,32 @@
 Packets go to the software vehicle; sequences to the app, to the software vehicle through its server's loop, to the CAN
 gateways, and to watch and guard of motion capture. Run by `make reliability`, which builds the C programs with
 sanitizers before. `--scale 0.01` tries a hundredth, and writes nothing; `--packets 1000000` and its like say how many
-there are of a kind, and the table says so. All run in parts, each with a seed of its own, so that the figures of an
-interrupted run are known.
+there are of a kind, and the table says so. All run in parts, each with a seed of its own; how far it is and how long
+the rest will take is printed after each. What is done is kept in build/kept: Ctrl-C ends it with the table so far, and
+the same command goes on.
 """
 
 import argparse
+import functools
 import os
 import re
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import marked
+from kept import Kept, package
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "RELIABILITY.md"
+FUZZER = ROOT / "build" / "fuzz" / "fuzz_crtp"
 BEGIN, END = "<!-- measured by tools/packets.py: begin -->", "<!-- measured by tools/packets.py: end -->"
-INPUTS_A_PART = 200_000
+DATAGRAMS_A_PART = 400_000
+DATAGRAMS_AN_INPUT = 4
+"""At least, as it has been so far."""
 _PACKETS = re.compile(r"fuzz_crtp: (\d+) inputs, (\d+) datagrams, (\d+) ms of the vehicle")
 
 
@@ -98,45 +105,53 @@ KINDS = (
 N_PACKETS = 20_000_000
 
 
-def sequences(kind: Kind, number: int) -> Total:
+def sequences(kind: Kind, seed: int, part: int) -> Total:
     """So many sequences; what breaks is printed with its shortest sequence."""
-    total, seed = Total(), 0
-    while total.tried < number:
-        seed += 1
-        part = min(kind.a_part, number - total.tried)
-        command = [word.format(number=part, seed=seed) for word in kind.command]
-        environment = {**os.environ, "IVL_SEQUENCES": str(part)} if kind.is_python else None
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, env=environment)
-        found = kind.says.search(done.stdout)
-        if done.returncode != 0 or found is None:
-            total.tried += part
-            total.broken += 1
-            print(done.stdout + done.stderr, flush=True)
-            continue
-        total.tried += int(found[1])
-        if not kind.is_python:
-            total.vehicle_ms += int(found[2])
-            total.flips += int(found[3])
-    print(f"{kind.name}: {total}", flush=True)
-    return total
+    command = [word.format(number=part, seed=seed) for word in kind.command]
+    environment = {**os.environ, "IVL_SEQUENCES": str(part)} if kind.is_python else None
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, env=environment)
+    found = kind.says.search(done.stdout)
+    if done.returncode != 0 or found is None:
+        print(done.stdout + done.stderr, flush=True)
+        return Total(part, broken=1)
+    if kind.is_python:
+        return Total(int(found[1]))
+    return Total(int(found[1]), int(found[2]), int(found[3]))
 
 
-def packets(number: int) -> Total:
-    """At least so many datagrams; libFuzzer writes what breaks the vehicle into a file and says which."""
-    total, seed = Total(), 0
+def packets(seed: int, part: int) -> Total:
+    """A call of libFuzzer for about so many datagrams, which writes what breaks the vehicle into a file and says which.
+
+    Raises:
+        SystemExit: It said nothing: it is not there, or could not begin.
+    """
+    command = ["tools/fuzz.sh", str(FUZZER), str(max(part // DATAGRAMS_AN_INPUT, 1000)), f"-seed={seed}"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    found = _PACKETS.search(done.stderr)
+    if done.returncode != 0 or found is None:
+        print(done.stdout + done.stderr[-4000:], flush=True)
+    if found is None:
+        raise SystemExit("packets: the fuzzer did not say what it had tried")
+    return Total(int(found[2]), int(found[3]), broken=int(done.returncode != 0))
+
+
+def in_parts(name: str, total: Total, number: int, a_part: int, kept: Kept, play: Callable[[int, int], Total]) -> None:
+    """Play parts until there are so many; those that an earlier call has played count, if nothing was broken."""
+    seed, n_new, began_s = 0, 0, time.monotonic()
     while total.tried < number:
         seed += 1
-        command = ["tools/fuzz.sh", "build/fuzz/fuzz_crtp", str(INPUTS_A_PART), f"-seed={seed}"]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-        found = _PACKETS.search(done.stderr)
-        if done.returncode != 0 or found is None:
-            total.broken += 1
-            print(done.stdout + done.stderr[-4000:], flush=True)
-            if found is None:
-                break
-        total.tried += int(found[2])
-        total.vehicle_ms += int(found[3])
-    return total
+        part = min(a_part, number - total.tried)
+        key = f"{part} of seed {seed}"
+        known = kept.get(key)
+        played = play(seed, part) if known is None else Total(**known)
+        if known is None and not played.broken:
+            kept.put(key, asdict(played))
+        n_new += played.tried if known is None else 0
+        for field, value in asdict(played).items():
+            setattr(total, field, getattr(total, field) + value)
+        left_s = (time.monotonic() - began_s) * (number - total.tried) / n_new if n_new else 0.0
+        left = f", {left_s / 60:.0f} min left" if n_new and total.tried < number else ""
+        print(f"{name}: {total.tried:,} of {number:,}, {total.broken} broken{left}", flush=True)
 
 
 def row(text: str, total: Total) -> str:
@@ -146,10 +161,10 @@ def row(text: str, total: Total) -> str:
     return f"| {text} | {total.tried:,} | {flown} | {total.broken} |\n"
 
 
-def table(hostile: Total, played: dict[str, Total]) -> str:
+def table(hostile: Total, played: dict[str, Total], note: str = "") -> str:
     """The results for the page."""
     head = (
-        f"`make reliability`, {time.strftime('%Y-%m-%d')}; what is C under AddressSanitizer and "
+        f"`make reliability`, {time.strftime('%Y-%m-%d')}{note}; what is C under AddressSanitizer and "
         "UndefinedBehaviorSanitizer.\n\n| what | tried | of the vehicle | broken |\n|---|---|---|---|\n"
     )
     rows = [row(f"sequences of {kind.text}", played[kind.name]) for kind in KINDS]
@@ -159,19 +174,31 @@ def table(hostile: Total, played: dict[str, Total]) -> str:
     return head + first + "".join(rows)
 
 
+def rests_on(kind: Kind) -> list[Path]:
+    """What the result of a sequence depends on: the program, or the test and the package."""
+    return [ROOT / kind.command[-2], *package()] if kind.is_python else [ROOT / kind.command[0]]
+
+
 def main() -> int:
-    """Try all of them; exit code 1 if something broke."""
+    """Try all of them; exit code 1 if something broke, 130 if somebody ended it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scale", type=float, default=1.0, help="share of the packets and sequences")
     parser.add_argument("--packets", type=int, default=N_PACKETS, help="datagrams to the software vehicle")
     for kind in KINDS:
         parser.add_argument(f"--{kind.name}", type=int, default=kind.number, help=f"sequences of {kind.text}")
     arguments = parser.parse_args()
-    played = {}
-    for kind in KINDS:
-        number = round(getattr(arguments, kind.name) * arguments.scale)
-        played[kind.name] = sequences(kind, number)
-    hostile = packets(round(arguments.packets * arguments.scale))
+    hostile, played = Total(), {kind.name: Total() for kind in KINDS}
+    try:
+        for kind in KINDS:
+            number = round(getattr(arguments, kind.name) * arguments.scale)
+            kept = Kept(kind.name, rests_on(kind))
+            in_parts(kind.name, played[kind.name], number, kind.a_part, kept, functools.partial(sequences, kind))
+        number = round(arguments.packets * arguments.scale)
+        in_parts("packets", hostile, number, DATAGRAMS_A_PART, Kept("packets", [FUZZER]), packets)
+    except KeyboardInterrupt:
+        print(table(hostile, played, ", ended before it was done"))
+        print("packets: ended; the same command goes on from here")
+        return 130
     text = table(hostile, played)
     print(text)
     if arguments.scale == 1.0:

@@ -13,6 +13,8 @@ ivl.sweep("smoke", vary={"sense.latency": [0.0, 0.02]})
 import os
 from typing import TYPE_CHECKING
 
+from ivl import memory  # noqa: F401 - looks at the limits of this process before anything large is loaded
+
 # The matrices here are small: more BLAS threads only cost time, and their number changes the last bits of a search.
 # It has to be said before numpy is loaded; a caller who has said otherwise is respected.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -1,6 +1,7 @@
 import json
 import os
 import random
+import resource
 import signal
 import sqlite3
 import subprocess
@@ -363,3 +364,39 @@ def test_json_of_numbers_that_are_missing_is_null(capsys: Capture, small: Experi
     assert found["rollouts_to_convergence"] is None
     assert found["failed_landings"] == 16
     assert np.isfinite(found["landing_rate_four_leg"])
+
+
+@pytest.mark.parametrize(
+    ("limit", "how"), [(resource.RLIMIT_AS, "ulimit -v"), (resource.RLIMIT_DATA, "ulimit -d")], ids=["space", "data"]
+)
+@pytest.mark.parametrize("megabytes", [60, 150, 349])
+def test_too_little_memory_to_be_loaded_is_one_line(limit: int, how: str, megabytes: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "ivl", "list"],
+        preexec_fn=lambda: resource.setrlimit(limit, (megabytes * 1_000_000, megabytes * 1_000_000)),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"ivl: this process may have {megabytes} MB of ")
+    assert f"`{how} unlimited`" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_what_finds_no_room_later_is_one_line_where_there_is_a_limit(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ImportError("libarrow.so: failed to map segment from shared object")
+
+    monkeypatch.setattr(cli, "app", fail)
+    monkeypatch.setattr("ivl.memory.resource.getrlimit", lambda _: (500_000_000, 500_000_000))
+    assert cli.run(["list"]) == 1
+    said = capsys.readouterr().err
+    assert "libarrow.so" in said
+    assert "500 MB of address space, and 2000 MB are needed" in said
+    assert said.count("\n") == 1
+    monkeypatch.setattr("ivl.memory.resource.getrlimit", lambda _: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    with pytest.raises(ImportError, match="failed to map"):
+        cli.run(["list"])

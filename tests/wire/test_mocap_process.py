@@ -394,6 +394,30 @@ def test_a_guard_hears_of_it_when_motion_capture_itself_fails(monkeypatch: pytes
         cameras.close()
 
 
+def test_a_guard_that_fails_is_a_body_that_is_lost_and_is_asked_again() -> None:
+    heard: list[Status] = []
+
+    class Listener:
+        def look(self, status: Status, *_: object) -> None:
+            heard.append(status)
+            if len(heard) in (2, 4):
+                raise OSError("the link is closed")
+
+        def in_flight(self) -> bool:
+            return False
+
+    cameras = Cameras()
+    try:
+        with Mocap(MocapConfig(system="simulator", body=BODY), request=cameras.request) as mocap:
+            mocap.guard = Listener()
+            wait_for(lambda: len(heard) > 6, "the guard is told after it has failed again")
+            assert heard[2:7] == [Status.FAILED] * 5
+            assert mocap.state().status is Status.FAILED
+            assert "OSError: the link is closed" in mocap.state().text
+    finally:
+        cameras.close()
+
+
 @pytest.mark.parametrize(
     "line",
     [
@@ -404,6 +428,10 @@ def test_a_guard_hears_of_it_when_motion_capture_itself_fails(monkeypatch: pytes
         b'{"t_s": 1, "bodies": {"a": [1, "x"]}}',
         b'{"bodies": {}}',
         b"[" * 9999,
+        b'{"t_s": 1, "bodies": {"a": [0, 0, ' + b"9" * 400 + b", 0, 0, 0, 1]}}",
+        b'{"t_s": 1, "bodies": {"a": "0010001"}}',
+        b'{"t_s": 1, "bodies": {"a": [0, 0, true, 0, 0, 0, 1]}}',
+        *(b'{"t_s": ' + t + b', "bodies": {}}' for t in (b"NaN", b"Infinity", b"1e308", b"-1", b'"1"', b"9" * 400)),
     ],
 )
 def test_a_strange_line_of_the_child_is_counted_and_no_frame(line: bytes) -> None:

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from ivl import __version__, files, optional
+from ivl import __version__, files, memory, optional
 from ivl.cli import (
     amend,
     bench,
@@ -111,8 +111,8 @@ def run(arguments: list[str] | None = None) -> int:
         return _fail(f"{error.format_message().replace('Value error, ', '')} (try `{command} --help`)", 2)
     except (KeyboardInterrupt, typer.Abort):
         return 130
-    except ModuleNotFoundError as error:
-        advice = optional.hint(error)
+    except (ImportError, LookupError, RuntimeError, SystemError) as error:
+        advice = _advice(error)
         if advice is None:
             raise
         return _fail(advice, 1)
@@ -145,6 +145,12 @@ def _flush(code: int) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python would try again at its end
         return 1 if error.errno == errno.EPIPE else _fail(f"output: {files.reason(error)}", 1)
     return code
+
+
+def _advice(error: Exception) -> str | None:
+    """What helps against something that could not be loaded; None for a fault of the program."""
+    missing = optional.hint(error) if isinstance(error, ModuleNotFoundError) else None
+    return missing or memory.explain(error)
 
 
 def _fail(message: str, code: int) -> int:

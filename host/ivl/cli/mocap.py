@@ -121,6 +121,8 @@ def _table(config: MocapConfig, state: MocapState) -> Table:
         f"freezes {counts.n_frozen}, jumps {counts.n_jumps}",
     )
     table.add_row("sent", f"{state.n_sent}   connections {1 + state.n_restarts}   {state.sink_error}")
+    if state.n_strange:
+        table.add_row("strange lines", f"{state.n_strange} of the tracking client")
     table.add_row("bodies", ", ".join(state.bodies) or "-")
     return table
 

@@ -48,6 +48,7 @@ class MocapState:
         counts: Events since the start.
         n_sent: Poses sent to the vehicle.
         n_restarts: Connections after the first.
+        n_strange: Lines of the present process that were no event of it.
         bodies: Names of the bodies in the last frame.
         sink_error: Why the last pose could not be sent; empty if it could.
     """
@@ -60,6 +61,7 @@ class MocapState:
     counts: Counts
     n_sent: int
     n_restarts: int
+    n_strange: int
     bodies: tuple[str, ...]
     sink_error: str
 
@@ -183,8 +185,16 @@ class Mocap:
             with self._lock:
                 self._failure, self._is_dead = f"motion capture itself failed: {type(error).__name__}: {error}", True
             while not self._ended.wait(TICK_S):
-                if self.guard is not None:
-                    self.guard.look(Status.FAILED, f"motion capture: {self._failure}", time.monotonic())
+                self._tell_guard_of_failure()
+
+    def _tell_guard_of_failure(self) -> None:
+        """Tell it, and go on telling it: it may be the guard itself that has failed, perhaps once only."""
+        try:
+            if self.guard is not None:
+                self.guard.look(Status.FAILED, f"motion capture: {self._failure}", time.monotonic())
+        except Exception as error:  # noqa: BLE001 - see `_run`
+            with self._lock:
+                self._failure = f"the guard failed: {type(error).__name__}: {error}"
 
     def _follow(self) -> None:
         assert self._tracker is not None
@@ -253,6 +263,7 @@ class Mocap:
             Counts(**asdict(self._watch.counts)),
             self._n_sent,
             self._n_restarts,
+            0 if self._tracker is None else self._tracker.n_strange,
             self._bodies,
             self._sink_error,
         )

@@ -120,9 +120,9 @@ class Tracker:
                 self.failure = str(event["error"])
             if "bodies" not in event:
                 return None
-            bodies = {str(name): [float(v) for v in values] for name, values in event["bodies"].items()}
-            return Frame(float(event["t_s"]), bodies)
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            bodies = {str(name): [_number(v) for v in values] for name, values in event["bodies"].items()}
+            return Frame(_time(event["t_s"]), bodies)
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError):
             self.n_strange += 1
             return None
 
@@ -135,3 +135,28 @@ class Tracker:
         said = self._errors.read().decode(errors="replace").strip().splitlines()
         what = f"signal {-code}" if code < 0 else f"exit code {code}"
         self.failure = self.failure or f"its client ended with {what}" + (f": {said[-1]}" if said else "")
+
+
+def _number(value: Any) -> float:
+    """A number as the process writes it, which may be none (NaN): a pose of such numbers is unusable.
+
+    Raises:
+        TypeError: It is something else.
+        OverflowError: It has too many digits.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise TypeError
+    return float(value)
+
+
+def _time(value: Any) -> float:
+    """When a frame came: a frame of the future would count as fresh for as long as that is away.
+
+    Raises:
+        TypeError, OverflowError: See `_number`.
+        ValueError: No such time has been.
+    """
+    t_s = _number(value)
+    if not 0.0 <= t_s <= time.monotonic():
+        raise ValueError
+    return t_s

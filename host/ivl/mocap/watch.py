@@ -247,7 +247,9 @@ class Watch:
             return Rates()
         intervals_ms = np.diff(recent) * 1e3
         p50, p99 = np.percentile(intervals_ms, (50, 99))
-        return Rates(1e3 / float(np.mean(intervals_ms)), float(p50), float(p99), float(np.max(intervals_ms)))
+        mean_ms = float(np.mean(intervals_ms))
+        rate_hz = 1e3 / mean_ms if mean_ms > 0.0 else math.nan  # the same frame again and again has none
+        return Rates(rate_hz, float(p50), float(p99), float(np.max(intervals_ms)))
 
     def _is_frozen(self, t_s: float, pose: Pose) -> bool:
         limit_s = self._config.frozen_s
