@@ -7,7 +7,7 @@
 #include "crtp_faults.h"
 
 #define IVL_CRTP_SILENCE_US 1000000u
-#define IVL_CRTP_SWITCH_US 200000u  ///< a request to switch the power waits so long for the client to be known to have gone, and no longer
+#define IVL_CRTP_SWITCH_US  200000u  ///< a request to switch the power waits so long for the client to be known to have gone, and no longer
 
 typedef struct
 {

@@ -210,6 +210,7 @@ static struct
     uint32_t    n_trigger, policy_crc, policy_seq;
     ivl_cfg_t   cfg;
     bool        was_ready;
+    bool        has_reset;  ///< somebody has asked for a landing to begin anew, which leaves every phase between two milliseconds
 } model;
 
 static const char *broken;
@@ -323,10 +324,11 @@ static void check_in_force(void)
 {
     const ivl_state_t *state = app_core_state();
     const uint32_t     seq = state->policy.id.seq, crc = state->policy.id.crc;
-    const bool         is_open = (model.phase == IVL_PHASE_IDLE) || (model.phase == IVL_PHASE_READY);
+    const bool         is_idle = (model.phase == IVL_PHASE_IDLE) || (model.has_reset && (state->phase == IVL_PHASE_IDLE));
+    const bool         is_open = is_idle || (model.phase == IVL_PHASE_READY);
     const bool         has_other_cfg = memcmp(&model.cfg, &ivl_app.cfg, sizeof model.cfg) != 0;
     must(is_open || ((seq == model.policy_seq) && (crc == model.policy_crc)), "a policy changed in flight");
-    must((model.phase == IVL_PHASE_IDLE) || !has_other_cfg, "a configuration changed in flight");
+    must(is_idle || !has_other_cfg, "a configuration changed in flight");
     must((seq == 0u) || (seq > TAGS) || (model.policy[seq].origin != OF_STRANGER), "a policy of a stranger is in force");
     model.policy_seq = seq;
     model.policy_crc = crc;
@@ -493,7 +495,9 @@ static void write_some(int client, size_t which, uint8_t value)
     memcpy(bytes, &id, sizeof id);
     memcpy(bytes + 2, &row->values[value % 4u], row->size);
     // a vehicle that is put elsewhere has nothing to obey
-    model.stop_ms = (strcmp(row->name, "reset") == 0) ? -1 : model.stop_ms;
+    const bool is_reset = strcmp(row->name, "reset") == 0;
+    model.stop_ms = is_reset ? -1 : model.stop_ms;
+    model.has_reset = model.has_reset || is_reset;
     (void)origin_of(client);
     send(client, 0x22u, bytes, 2u + row->size);
 }
@@ -631,6 +635,10 @@ static void check_nobody_is_locked_out(void)
     around.n_answers[0] = 0;
     while ((around.n_answers[0] == 0u) && (around.now_us < ends_us))
     {
+        // who asked for it just before the client went may have switched it off
+        send(0, 0xffu, (const uint8_t[]){0xfeu, 0x03u}, 2);
+        let_pass_us(1500u);
+        around.n_answers[0] = 0;
         connect(0);
         let_pass_us(500000u);
     }

@@ -12,7 +12,7 @@ from ivl.links.packets import Phase
 from ivl.mocap import config as configs
 from ivl.mocap.config import MocapConfig
 from ivl.mocap.guard import LossGuard
-from ivl.mocap.watch import VELOCITY_S, Pose, Status, Watch, _Past, make_pose
+from ivl.mocap.watch import VELOCITY_S, Pose, Status, Watch, _from_segment_m, _Past, make_pose
 
 DT_S = 0.01
 LEVEL = (0.0, 0.0, 0.0, 1.0)
@@ -291,6 +291,41 @@ def test_y_up_turns_world_and_body() -> None:
     heading = make_pose([0.0, 0.0, 0.0, 0.0, math.sin(0.3), 0.0, math.cos(0.3)], up="y")
     assert heading is not None
     assert heading.q_WB == pytest.approx((0.0, 0.0, math.sin(0.3), math.cos(0.3)))
+
+
+def test_a_single_pose_says_nothing_of_a_motion_and_two_do() -> None:
+    here, there = Pose((0.0, 0.0, 1.0), LEVEL), Pose((0.01, 0.0, 1.0), LEVEL)
+    past = _Past().add(0.0, here)
+    assert not past.moves_to(0.01, here, config())
+    assert past.add(0.01, there).moves_to(0.02, Pose((0.02, 0.0, 1.0), LEVEL), config())
+    assert not past.moves_to(0.02, Pose((5.0, 0.0, 1.0), LEVEL), config())
+
+
+def test_a_velocity_is_that_of_the_span_and_of_no_longer_time() -> None:
+    # at rest for as long as the span, then 1 m/s: each pose is exactly on the span's grid
+    past = _Past()
+    for i in range(4):
+        past.add(i * VELOCITY_S, Pose((0.0, 0.0, 1.0), LEVEL))
+    assert len(past._poses) == 2
+    past.add(4 * VELOCITY_S, Pose((VELOCITY_S, 0.0, 1.0), LEVEL))
+    assert past.motion(config()).v_W_mps == pytest.approx((1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("point", "away_m"),
+    [((-3.0, 0.0, 4.0), 5.0), ((1.0, 2.0, 0.0), 2.0), ((5.0, 0.0, 4.0), 5.0), ((2.0, 0.0, 0.0), 0.0)],
+)
+def test_distance_from_a_segment_of_two_metres(point: tuple[float, float, float], away_m: float) -> None:
+    assert _from_segment_m((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), point) == pytest.approx(away_m)
+    assert _from_segment_m((2.0, 0.0, 0.0), (0.0, 0.0, 0.0), (2.0, 1.0, 0.0)) == 1.0
+
+
+def test_the_same_frame_again_and_again_has_no_rate() -> None:
+    watch = Watch(config())
+    for _ in range(3):
+        watch.take(5.0, Pose((0.0, 0.0, 1.0), LEVEL))
+    assert math.isnan(watch.rates(5.0).rate_hz)
+    assert watch.rates(5.0).interval_ms_max == 0.0
 
 
 def test_rates_of_a_known_rhythm() -> None:
