@@ -2,7 +2,7 @@
 #
 # This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
 # Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS, VEHICLE, GEAR, SIL_ARGS,
-# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS, WHEEL_ARGS, RELIABILITY_ARGS.
+# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS, WHEEL_ARGS, PACKETS_ARGS.
 
 PYTHON     ?= python3
 CLANG      ?= clang-14
@@ -250,17 +250,17 @@ sequences: toolchain $(UNITY)/unity.c ## random sequences for the app, and for t
 	@+$(NATIVE) FLAVOUR=san sequences SEQUENCES=$(or $(SEQUENCES),20000) SEED=$(or $(SEED),1)
 
 .PHONY: reliability
-reliability: setup-dev build toolchain $(UNITY)/unity.c ## damaged files, failing disks, hostile packets, links that lose and restart; writes docs/RELIABILITY.md (hours; Ctrl-C, and again, goes on; RELIABILITY_ARGS='--scale 0.01' tries a hundredth)
+reliability: setup-dev build toolchain $(UNITY)/unity.c ## damaged files, failing disks, hostile packets, links that lose and restart; writes docs/RELIABILITY.md (hours)
 	@+$(APP) build/app/sequences
 	@+$(NATIVE) FLAVOUR=san build/san/loop_sequences
 	@tools/apt_install.sh $(FUZZER)
 	@+$(NATIVE) FLAVOUR=fuzz fuzz
-	@$(BIN)/python tools/packets.py $(RELIABILITY_ARGS)
+	@$(BIN)/python tools/packets.py $(PACKETS_ARGS)
 	@mkdir -p build/borders
 	@$(CC) -std=c11 -O1 -Wall -Wextra -Werror -shared -fPIC -o build/borders/faulty_io.so tools/faulty_io.c -ldl
 	@LD_PRELOAD=$(CURDIR)/build/borders/faulty_io.so IVL_FAULTY_IO=$(CURDIR)/build/borders/faulty_io.so \
-	    $(BIN)/python tools/borders.py $(RELIABILITY_ARGS)
-	@$(BIN)/python tools/reliability.py $(RELIABILITY_ARGS)
+	    $(BIN)/python tools/borders.py
+	@$(BIN)/python tools/reliability.py
 
 # which C tests know of forms; the image of the chip is that of `ivl learn --uri pil://`
 FORMS_TESTS    := test_ivl_policy test_ivl_parts test_ivl_wire test_ivl_fuzz

@@ -3,8 +3,7 @@
 Run by `make reliability`, which loads tools/faulty_io.c before libc. Each input is tried in a process of its own. It
 must end in a good result or in one line with exit code 1 or 2; a number that is read must be the number that is
 written there; after a failure of the disk `--resume` must give the same bits as a run without one. `--scale 0.1` tries
-a tenth, and writes nothing. Kinds that are done are kept in build/kept: Ctrl-C ends it with the table so far, and the
-same command goes on.
+a tenth, and writes nothing.
 """
 
 import argparse
@@ -23,8 +22,8 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Any
@@ -32,7 +31,6 @@ from typing import Any
 import marked
 import numpy as np
 import yaml
-from kept import Kept, package
 
 from ivl import cli, experiment, landing, model, native, tracefile, yamlfile
 from ivl.errors import IvlError
@@ -47,8 +45,6 @@ PAGE = ROOT / "docs" / "RELIABILITY.md"
 BEGIN, END = "<!-- measured by tools/borders.py: begin -->", "<!-- measured by tools/borders.py: end -->"
 TIME_S = 60.0
 """An input that takes longer counts as a traceback."""
-ERRORS = {"full disk": errno.ENOSPC, "EIO": errno.EIO, "EROFS": errno.EROFS, "SIGKILL": 0, "ENOLCK": errno.ENOLCK}
-"""What a failing operation says; 0: nothing, it is the program's end."""
 SMALL = ["budget=16", "check.n_fresh=2", "check.effort=0.001"]
 
 
@@ -416,8 +412,8 @@ def try_policies(row: Row, n: int, folder: Path, rng: random.Random) -> None:
 # ---- faults of the machine
 
 
-def try_disk(rows: dict[str, Row], n: int, folder: Path, seed: int, shim: Any) -> Iterator[Row]:
-    """Let each of many operations on a run folder fail, then continue; a row when it is done."""
+def try_disk(rows: dict[str, Row], n: int, folder: Path, rng: random.Random, shim: Any) -> None:
+    """Let each of many operations on a run folder fail, then continue."""
     file = folder / "small.yaml"
     file.write_text(experiment.load("experiments/paper_vertical.yaml", SMALL, learner="ephe").to_yaml())
 
@@ -436,9 +432,9 @@ def try_disk(rows: dict[str, Row], n: int, folder: Path, seed: int, shim: Any) -
         raise SystemExit(began.said)
     operations = int(began.said.rpartition("operations ")[2])
     expected = database_rows(reference), result_of(reference)
-    for name, row in rows.items():
-        error = ERRORS[name]
-        rng = random.Random(f"{seed} {name}")
+    errors = {"full disk": errno.ENOSPC, "EIO": errno.EIO, "EROFS": errno.EROFS, "SIGKILL": 0, "ENOLCK": errno.ENOLCK}
+    for name, error in errors.items():
+        row = rows[name]
         places = [0, 1] if error == errno.ENOLCK else sorted(rng.sample(range(operations), min(n, operations)))
         for at in places:
             run = folder / "run"
@@ -457,7 +453,6 @@ def try_disk(rows: dict[str, Row], n: int, folder: Path, seed: int, shim: Any) -
             if again.code or (database_rows(run), result_of(run)) != expected:
                 row.lost += 1
                 row.note(f"{name} at {at}: not continued: code {again.code}: {again.said[-300:]}")
-        yield row
 
 
 def result_of(run: Path) -> Any:
@@ -478,15 +473,21 @@ def table(rows: list[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def all_rows(scale: float, seed: int, kept: Kept) -> Iterator[Row]:
-    """Try everything, or recall it; a row when it is done."""
+def main() -> None:
+    """Try everything, print what failed, write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scale", type=float, default=1.0, help="share of the inputs to try")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
     shim = ctypes.CDLL(os.environ["IVL_FAULTY_IO"])
     shim.ivl_fault_arm.argtypes = [ctypes.c_char_p, ctypes.c_long, ctypes.c_int]
     shim.ivl_fault_count.restype = ctypes.c_long
+    rng = random.Random(arguments.seed)
 
     def times(n: int) -> int:
-        return max(round(scale * n), 3)
+        return max(round(arguments.scale * n), 3)
 
+    rows = []
     with tempfile.TemporaryDirectory(prefix="ivl borders [x] ") as name:
         folder = Path(name)
         good = folder / "good run"
@@ -494,77 +495,35 @@ def all_rows(scale: float, seed: int, kept: Kept) -> Iterator[Row]:
             "--out", str(good), *(word for s in SMALL for word in ("--set", s))]), folder)  # fmt: skip
         if code.code:
             raise SystemExit(code.said)
-        kinds: list[tuple[str, int, Callable[[Row, int, random.Random], None]]] = [
-            ("spellings of a number in YAML", 20_000, lambda r, n, rng: try_scalars(r, n, folder, rng)),
-            ("damaged experiment, vehicle and gear files", 400, lambda r, n, rng: try_yaml(r, n, folder, rng)),
-            ("damaged traces, CSV", 250, lambda r, n, rng: try_traces(r, n, folder, rng, ".csv")),
-            ("damaged traces, npz", 150, lambda r, n, rng: try_traces(r, n, folder, rng, ".npz")),
-            (
-                "damaged runs of `ivl learn` (SQLite, JSON, YAML)",
-                240,
-                lambda r, n, rng: try_run(r, n, folder, rng, good),
-            ),
-            (
-                "damaged sweeps (Parquet, JSON)",
-                200,
-                lambda r, n, rng: try_sweep(r, n, folder, rng, small_sweep(folder)),
-            ),
-            ("damaged policies", 150, lambda r, n, rng: try_policies(r, n, folder, rng)),
+        kinds: list[tuple[str, int, Callable[[Row, int], None]]] = [
+            ("spellings of a number in YAML", 20_000, lambda r, n: try_scalars(r, n, folder, rng)),
+            ("damaged experiment, vehicle and gear files", 400, lambda r, n: try_yaml(r, n, folder, rng)),
+            ("damaged traces, CSV", 250, lambda r, n: try_traces(r, n, folder, rng, ".csv")),
+            ("damaged traces, npz", 150, lambda r, n: try_traces(r, n, folder, rng, ".npz")),
+            ("damaged runs of `ivl learn` (SQLite, JSON, YAML)", 240, lambda r, n: try_run(r, n, folder, rng, good)),
+            ("damaged sweeps (Parquet, JSON)", 200, lambda r, n: try_sweep(r, n, folder, rng, small_sweep(folder))),
+            ("damaged policies", 150, lambda r, n: try_policies(r, n, folder, rng)),
         ]
         for kind, n, attempt in kinds:
-            known = kept.get(f"{kind}, {times(n)}")
-            row = Row(kind) if known is None else Row(**known)
-            if known is None:
-                attempt(row, times(n), random.Random(f"{seed} {kind}"))
-                keep(kept, row, times(n))
-            yield row
-        n = times(52)
-        disk = {name: Row(f"a write to a run folder fails: {name}") for name in ERRORS}
-        known_rows = {name: kept.get(f"{row.kind}, {n}") for name, row in disk.items()}
-        yield from (Row(**known) for known in known_rows.values() if known is not None)
-        wanted = {name: row for name, row in disk.items() if known_rows[name] is None}
-        if wanted:
-            for row in try_disk(wanted, n, folder, seed, shim):
-                keep(kept, row, n)
-                yield row
-
-
-def keep(kept: Kept, row: Row, n: int) -> None:
-    """Keep a row in which nothing was broken."""
-    if not is_broken(row):
-        kept.put(f"{row.kind}, {n}", asdict(row))
-
-
-def is_broken(row: Row) -> bool:
-    """Whether something of this kind ended as nothing may."""
-    return bool(row.tracebacks or row.wrong or row.lost)
-
-
-def main() -> int:
-    """Try everything, print what failed, write the page; exit code 1 if something did, 130 if somebody ended it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scale", type=float, default=1.0, help="share of the inputs to try")
-    parser.add_argument("--seed", type=int, default=1)
-    arguments = parser.parse_args()
-    tools = ROOT / "tools"
-    kept = Kept(f"borders-seed{arguments.seed}", [*package(), tools / "borders.py", tools / "faulty_io.c"])
-    rows: list[Row] = []
-    began_s = time.monotonic()
-    try:
-        for row in all_rows(arguments.scale, arguments.seed, kept):
+            row = Row(kind)
+            attempt(row, times(n))
             rows.append(row)
-            counts = f"{row.tried} tried, {row.tracebacks} tracebacks, {row.wrong} wrong, {row.lost} lost"
-            print(f"{row.kind}: {counts}; {time.monotonic() - began_s:.0f} s", flush=True)
-            print("".join(f"!! {row.kind}: {text}\n" for text in row.told), end="", flush=True)
-    except KeyboardInterrupt:
-        print(table(rows))
-        print("borders: ended; the same command goes on from here")
-        return 130
+            print(f"{row.kind}: {row.tried} tried, {row.tracebacks} tracebacks, {row.wrong} wrong", flush=True)
+        disk = {
+            name: Row(f"a write to a run folder fails: {name}")
+            for name in ("full disk", "EIO", "EROFS", "SIGKILL", "ENOLCK")
+        }
+        try_disk(disk, times(52), folder, rng, shim)
+        rows += disk.values()
+    for row in rows:
+        for text in row.told:
+            print(f"!! {row.kind}: {text}")
     print(table(rows))
     if arguments.scale == 1.0:
         marked.write(PAGE, table(rows), BEGIN, END)
-    return int(any(is_broken(row) for row in rows))
+    if any(row.tracebacks or row.wrong or row.lost for row in rows):
+        raise SystemExit(1)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

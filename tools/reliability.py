@@ -1,8 +1,6 @@
 """Learn over links that misbehave, compare every stored bit with learning in process, and write docs/RELIABILITY.md.
 
-Run by `make reliability`. Options shorten it: `--budget 32 --only freeze`, or `--scale 0.1` for a tenth of the budget;
-then nothing is written. Links that are done are kept in build/kept: Ctrl-C ends it with the table so far, and the same
-command goes on.
+Run by `make reliability`. Options shorten it: `--budget 32 --only freeze`; then nothing is written.
 """
 
 import argparse
@@ -13,11 +11,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import marked
-from kept import Kept, package
 
 from ivl import experiment, native, run
 from ivl.errors import IvlError
@@ -199,54 +196,28 @@ def table(results: list[Result], chosen: Experiment) -> str:
     return "\n".join(lines) + "\n"
 
 
-def run_cases(cases: list[Case], chosen: Experiment, kept: Kept) -> Iterator[Result]:
-    """Learn in process, and then over each link, or recall what came of it."""
+def main() -> int:
+    """Run the cases; exit code 1 if one of them did not end right."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--experiment", default="experiments/paper_vertical.yaml")
+    parser.add_argument("--budget", type=int, help="rollouts, instead of the experiment's")
+    parser.add_argument("--only", action="append", choices=[case.name for case in CASES], help="this case alone")
+    arguments = parser.parse_args()
+    chosen = experiment.load(arguments.experiment, budget=arguments.budget)
+    cases = [case for case in CASES if not arguments.only or case.name in arguments.only]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         learn(chosen, folder / "in-process", WorldSource(chosen.make_world(), chosen, 1))
         reference = rows_of(folder / "in-process")
+        results = []
         for case in cases:
             print(f"{case.name}: {case.text}", flush=True)
-            key = f"{case.name}, {case.text}, {chosen.name}, {chosen.budget}"
-            known = kept.get(key)
-            result = run_case(case, chosen, reference, folder / case.name) if known is None else Result(case, **known)
-            if known is None and is_right(result):
-                kept.put(key, {name: value for name, value in asdict(result).items() if name != "case"})
-            yield result
-
-
-def is_right(result: Result) -> bool:
-    """Whether a run over a link ended as the one in process."""
-    return result.same and not result.error and not result.n_wrong and not result.n_lost
-
-
-def main() -> int:
-    """Run the cases; exit code 1 if one of them did not end right, 130 if somebody ended it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--experiment", default="experiments/paper_vertical.yaml")
-    parser.add_argument("--budget", type=int, help="rollouts, instead of the experiment's")
-    parser.add_argument("--scale", type=float, default=1.0, help="share of the rollouts")
-    parser.add_argument("--only", action="append", choices=[case.name for case in CASES], help="this case alone")
-    arguments = parser.parse_args()
-    whole = experiment.load(arguments.experiment, budget=arguments.budget)
-    budget = max(round(whole.budget * arguments.scale), whole.n_rollouts)
-    chosen = experiment.load(arguments.experiment, budget=budget)
-    cases = [case for case in CASES if not arguments.only or case.name in arguments.only]
-    results: list[Result] = []
-    try:
-        for result in run_cases(cases, chosen, Kept("links", [*package(), Path(__file__)])):
-            results.append(result)
-            ended = "as in process" if is_right(result) else f"NOT as in process {result.error}"
-            print(f"    {result.wall_s:.0f} s, {ended}", flush=True)
-    except KeyboardInterrupt:
-        print(table(results, chosen))
-        print("reliability: ended; the same command goes on from here")
-        return 130
+            results.append(run_case(case, chosen, reference, folder / case.name))
     text = table(results, chosen)
     print(text)
-    if arguments.only is None and budget == experiment.load(arguments.experiment).budget:
+    if arguments.only is None and arguments.budget is None:
         marked.write(PAGE, text, BEGIN, END)
-    return 0 if all(is_right(result) for result in results) else 1
+    return 0 if all(r.same and not r.error and not r.n_wrong and not r.n_lost for r in results) else 1
 
 
 if __name__ == "__main__":
