@@ -2,7 +2,7 @@
 #
 # This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
 # Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS, VEHICLE, GEAR, SIL_ARGS,
-# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS, WHEEL_ARGS.
+# FUZZ_RUNS, FUZZ_ARGS, VISION_ARGS, CAD_ARGS, WHEEL_ARGS.
 
 PYTHON     ?= python3
 CLANG      ?= clang-14
@@ -73,6 +73,11 @@ figs: setup build ## the paper's figures 4 to 9 from RUN=... (a sweep's run fold
 	$(say) 'figs: $(RUN)'
 	@test -n '$(RUN)' || { echo 'figs: say which run, for example: make figs RUN=runs/paper-as_simulated-bo'; exit 2; }
 	@$(BIN)/ivl figs $(RUN)
+
+.PHONY: vision
+vision: setup build ## pictures of an onboard camera, rendered and estimated: how wrong its cues are (VISION_ARGS='--approaches 400 --json')
+	$(say) 'vision: surfaces, light and lenses'
+	@$(BIN)/ivl camera table $(VISION_ARGS)
 
 .PHONY: cad
 cad: setup build openscad ## legs and jigs to print, as STL in build/cad (CAD_ARGS='--gear-set mine.yaml --gear wide'; tools/cad.py --help)
@@ -389,7 +394,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/vision/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/camera/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
 
 # set-up, each step once
 

@@ -30,7 +30,7 @@ WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-prom
 # no contraction: the same source gives the same bits on every machine and compiler, whatever its instructions
 # the flight core also in halves, for vehicles side by side
 CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -DIVL_SIDE_BY_SIDE -fno-math-errno -fPIC -pthread \
-          -Ifirmware/core -Isim_sil -Isim_sil/physics -Isim_sil/world
+          -Ifirmware/core -Ifirmware/vision -Isim_sil -Isim_sil/physics -Isim_sil/world -Isim_sil/camera
 LDLIBS := -lm -pthread
 
 # objects of the release flavour also carry what GCC needs to optimise library and vehicle as a whole; all others link them as they are, which
@@ -50,6 +50,7 @@ COMBINE = $(or $(COMBINE_$(FLAVOUR)),ld -r)
 FLAGS_sim_sil := -Wno-psabi -Ifirmware/app -isystem firmware/sdk
 FLAGS_sim_sil/physics := $(FLAGS_sim_sil)
 FLAGS_sim_sil/world := $(FLAGS_sim_sil)
+FLAGS_sim_sil/camera := $(FLAGS_sim_sil)
 FLAGS_sim_sil/pil := $(FLAGS_sim_sil) -Ifirmware/stm32f405
 
 # the software vehicle: the app's own sources, with the vehicle in the place of its SDK
@@ -97,7 +98,8 @@ WIDE_PART := $(patsubst %.c,%.o,$(wildcard sim_sil/physics/*.c sim_sil/world/*.c
 
 CORE    := $(patsubst %.c,$(SHARED)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
 SENSES  := firmware/app/app_senses.c
-SIM     := $(patsubst %.c,$(SHARED)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES)) $(WIDE)
+VISION  := $(patsubst %.c,$(SHARED)/%.o,$(wildcard firmware/vision/*.c))
+SIM     := $(patsubst %.c,$(SHARED)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/camera/*.c sim_sil/pil/*.c) $(SENSES)) $(VISION) $(WIDE)
 CF      := $(patsubst %.c,$(SHARED)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(SHARED)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
