@@ -74,6 +74,7 @@ ifeq ($(FLAVOUR),fuzz)
 FLAGS_sim_sil/crtp += -fsanitize=fuzzer-no-link
 FLAGS_sim_sil/cf   += -fsanitize-coverage=inline-8bit-counters,pc-table
 FLAGS_firmware/app += -fsanitize-coverage=inline-8bit-counters,pc-table
+FLAGS_firmware/vision += -fsanitize=fuzzer-no-link
 endif
 
 # FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h, which only ivl_form.c includes.  All other
@@ -158,7 +159,7 @@ $(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(SHARED)/sim_sil/crtp/crtp_main.
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -o $@ $(filter %.o,$^) $(LDLIBS)
 
-fuzz: $(BUILD)/fuzz_crtp
+fuzz: $(BUILD)/fuzz_crtp $(BUILD)/fuzz_vision
 
 sequences: $(BUILD)/loop_sequences
 	@timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED)
@@ -171,6 +172,10 @@ $(BUILD)/loop_sequences: $(SHARED)/tests/fuzz/loop_sequences.o $(CORE) $(SIM) $(
 	@$(COMPILER) $(CFLAGS) $(AS_THEY_ARE) -Wl,--wrap=clock_gettime -Wl,--wrap=ivl_crtp_step -o $@ $(filter %.o,$^) $(LDLIBS)
 
 $(BUILD)/fuzz_crtp: $(SHARED)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
+
+$(BUILD)/fuzz_vision: $(SHARED)/tests/fuzz/fuzz_vision.o $(VISION) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
 
@@ -270,5 +275,5 @@ $(BUILD)/objects.txt: FORCE
 $(SHARED)/widths.txt: FORCE
 	$(call remember,$(WIDE_PART))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(SHARED)/sim_sil/crtp/crtp_main.o $(SHARED)/tests/fuzz/fuzz_crtp.o $(SHARED)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(SHARED)/tests/c/%.o) \
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(SHARED)/sim_sil/crtp/crtp_main.o $(SHARED)/tests/fuzz/fuzz_crtp.o $(SHARED)/tests/fuzz/fuzz_vision.o $(SHARED)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(SHARED)/tests/c/%.o) \
     $(foreach n,$(WIDTHS),$(WIDE_PART:%=$(SHARED)/lanes$n/%)))

@@ -8,10 +8,10 @@
 
 enum
 {
-    PASSES_PREDICTED = 2,
     PASSES_COARSEST = 5,
     PASSES_COARSE = 3,
-    PASSES_STARTED = 3,  ///< of the finest level, after the coarse ones
+    PASSES_STARTED = 3,  ///< of the finest level, where nothing was predicted
+    PASSES_PREDICTED = 2,
     DT_US_MIN = 2000,
     DT_US_MAX = 300000,
     QUALITY_BITS = 6  ///< contrast over residual in quarters is one step of the quality
@@ -47,8 +47,8 @@ static bool within(int64_t value, int64_t lo, int64_t hi)
 
 static bool cfg_is_possible(const ivl_vision_cfg_t *cfg)
 {
-    return (cfg->bin == 2 || cfg->bin == 4) && within(cfg->window_w, 16, IVL_VISION_WINDOW_W) && cfg->window_w % IVL_VISION_COLUMNS == 0 &&
-           within(cfg->window_h, 12, IVL_VISION_WINDOW_H) && cfg->window_h % IVL_VISION_BANDS == 0 &&
+    return (cfg->bin == 2 || cfg->bin == 4) && within(cfg->window_w, 32, IVL_VISION_WINDOW_W) && cfg->window_w % IVL_VISION_COLUMNS == 0 &&
+           within(cfg->window_h, 24, IVL_VISION_WINDOW_H) && cfg->window_h % IVL_VISION_BANDS == 0 &&
            within(cfg->horizon_q12, 40, 1024) && cfg->attitude_q16 <= 6554 && within(cfg->focal_q16, 16 * 65536, 128 * 65536) &&
            within(cfg->centre_x_q16, 20 * 65536, 60 * 65536) && within(cfg->centre_y_q16, 15 * 65536, 45 * 65536) &&
            within(cfg->radial_q16[0], -65536, 65536) && within(cfg->radial_q16[1], -65536, 65536);
@@ -172,7 +172,7 @@ static void predict(const ivl_vision_state_t *state, const int32_t normal_q30[3]
     const int64_t left_q20 = (1 << 20) - ivl_vision_clamp(past_q20, 1 << 19);
     for (int k = 0; k < 3; k++)
     {
-        const int64_t p_q20 = (int64_t)state->motion_q20_per_s[k] * gap_us / 1000000;
+        const int64_t p_q20 = ivl_vision_clamp((int64_t)state->motion_q20_per_s[k] * gap_us / 1000000, 1 << 22);
         p_q30[k] = (int32_t)ivl_vision_clamp(p_q20 * ((int64_t)1 << 30) / left_q20, IVL_VISION_ONE_Q30 / 4);
     }
 }

@@ -32,8 +32,8 @@ enum
 typedef struct
 {
     uint16_t        bin;             ///< pixels of the sensor, each way, that make one: 2 or 4; with a Bayer sensor 4
-    uint16_t        window_w;        ///< central part that is used, multiple of 4, 16 .. 60
-    uint16_t        window_h;        ///< multiple of 6, 12 .. 48
+    uint16_t        window_w;        ///< central part that is used, multiple of 4, 32 .. 60
+    uint16_t        window_h;        ///< multiple of 6, 24 .. 48
     uint16_t        horizon_q12;     ///< closing of a pair over the distance that is aimed at: RREV times the time between the pictures
     uint16_t        attitude_q16;    ///< standard deviation of the attitude that is told, rad; up to 0.1
     int32_t         focal_q16;       ///< focal length in binned pixels, 16 .. 128

@@ -31,7 +31,7 @@ typedef struct
     int32_t v_q12;
 } view_t;
 
-/// Sums of a few pixels of a row; 15 of them do not overflow.
+/// Sums of a segment of a row; 15 pixels do not overflow.
 typedef struct
 {
     int32_t normal[PRODUCTS], right[BASIS], residual;
@@ -174,11 +174,11 @@ static void add_row(const ivl_vision_pair_t *pair, const view_t *view, const int
 /// Direction of pixels, and how much they face the surface.
 static void look_along_row(const ivl_vision_pair_t *pair, const int32_t normal_q30[3], int x0, int y, view_t *view)
 {
-    const int64_t u = (((int64_t)(x0 * 65536 - pair->centre_x_q16)) << 16) / pair->focal_q16;
-    const int64_t v = (((int64_t)(y * 65536 - pair->centre_y_q16)) << 16) / pair->focal_q16;
+    const int64_t u = (int64_t)(x0 * 65536 - pair->centre_x_q16) * 65536 / pair->focal_q16;
+    const int64_t v = (int64_t)(y * 65536 - pair->centre_y_q16) * 65536 / pair->focal_q16;
     const int64_t step = ((int64_t)1 << 32) / pair->focal_q16;
     view->v_q12 = (int32_t)(v >> 4);
-    view->s_q20 = (int32_t)((normal_q30[0] * u + normal_q30[1] * v + ((int64_t)normal_q30[2] << 16)) >> 26);
+    view->s_q20 = (int32_t)((normal_q30[0] * u + normal_q30[1] * v + (int64_t)normal_q30[2] * 65536) >> 26);
     view->s_step_q20 = (int32_t)((normal_q30[0] * step) >> 26);
 }
 
@@ -293,7 +293,7 @@ static void variance(const ivl_vision_solution_t *solution, ivl_vision_block_t b
 
 /// Contrast over residual: 1 over the trace of the inverse, which is the least eigenvalue or up to a third of it, with each term in units of
 /// what noise of one grey value would give it.
-static int64_t contrast_q8(const ivl_vision_pair_t *pair, const ivl_vision_sums_t *sums, const ivl_vision_solution_t *s)
+static int64_t contrast_q8(const ivl_vision_pair_t *pair, const ivl_vision_solution_t *s)
 {
     // mean of u^2 + v^2 over the window, Q12
     const int64_t w = pair->window_w, h = pair->window_h, f = pair->focal_q16 >> 8;
@@ -307,7 +307,7 @@ static int64_t contrast_q8(const ivl_vision_pair_t *pair, const ivl_vision_sums_
         const int64_t part = ivl_vision_scale(ivl_vision_clamp(diagonal_q20, (int64_t)1 << 36), 2 * (s->shift_residual - s->shift[IVL_VISION_MOTION + k]));
         inverse += (ivl_vision_clamp(part, (int64_t)1 << 40) * unit_q12) >> 12;
     }
-    const int64_t residual_q30 = ivl_vision_scale(sums->residual, 30 - 2 * s->shift_residual);
+    const int64_t residual_q30 = ivl_vision_scale(s->left, 30 - 2 * s->shift_residual);
     const int64_t product_q20 = (ivl_vision_clamp(inverse, (int64_t)1 << 32) * residual_q30) >> 30;
     return ((int64_t)1 << 28) / ((product_q20 > 0) ? product_q20 : 1);
 }
@@ -329,17 +329,17 @@ bool ivl_vision_fit_pass(const ivl_vision_pair_t *pair, ivl_vision_belief_t *bel
     }
     sum_up(pair, belief, &map, block, &sums);
     fit->n_pixels = (int32_t)sums.normal[0][0];
-    fit->residual = sums.residual;
     if (fit->n_pixels * MIN_PIXELS_SHARE < pair->window_w * pair->window_h || !ivl_vision_solve(&sums, &solution))
     {
         return false;
     }
+    fit->residual = solution.left;
     for (int k = 0; k < 3; k++)
     {
         const int64_t x = ivl_vision_clamp(solution.x_q30[IVL_VISION_MOTION + k], (int64_t)1 << 40);
         fit->step_q30[k] = (int32_t)ivl_vision_clamp(x * GRADIENT_SCALE * 65536 / pair->focal_q16, IVL_VISION_ONE_Q30 / 4);
     }
-    fit->contrast_q8 = contrast_q8(pair, &sums, &solution);
+    fit->contrast_q8 = contrast_q8(pair, &solution);
     if (block)
     {
         variance(&solution, block, pair->focal_q16, fit);

@@ -32,7 +32,7 @@ typedef struct
 typedef struct
 {
     int32_t n_pixels;
-    int64_t residual;          ///< sum of squares
+    int64_t residual;          ///< sum of the squares that the pass leaves
     int64_t contrast_q8;       ///< least information about any part of the motion, over what noise of the size of the residual would feign; 256 is equal
     int64_t variance_q60[3][3];  ///< of the motion, from the scatter of the blocks
     int32_t step_q30[3];       ///< by how much this pass moved p

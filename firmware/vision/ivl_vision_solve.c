@@ -102,16 +102,22 @@ bool ivl_vision_solve(const ivl_vision_sums_t *sums, ivl_vision_solution_t *s)
     {
         return false;
     }
-    int64_t y[N];
+    int64_t y[N], right_q30[N];
+    int64_t left_q30 = ivl_vision_scale(sums->residual, 30 - 2 * s->shift_residual);
     for (int i = 0; i < N; i++)
     {
-        y[i] = ivl_vision_scale(sums->right[i], 30 - s->shift[i] - s->shift_residual);
+        right_q30[i] = ivl_vision_clamp(ivl_vision_scale(sums->right[i], 30 - s->shift[i] - s->shift_residual), IVL_VISION_ONE_Q30);
+        y[i] = right_q30[i];
     }
     substitute(s, y);
     for (int i = 0; i < N; i++)
     {
+        left_q30 -= ivl_vision_shift(ivl_vision_clamp(y[i], (int64_t)1 << 32) * right_q30[i], 30);
         s->x_q30[i] = ivl_vision_scale(ivl_vision_clamp(y[i], X_MAX_Q30), s->shift_residual - s->shift[i]);
     }
+    // what rounding leaves of nothing
+    const int64_t least_q30 = 1 << 8;
+    s->left = ivl_vision_scale((left_q30 > least_q30) ? left_q30 : least_q30, 2 * s->shift_residual - 30);
     for (int motion = 0; motion < 3; motion++)
     {
         int64_t unit[N] = {0};

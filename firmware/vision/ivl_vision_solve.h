@@ -28,7 +28,8 @@ typedef struct
     int64_t pivot_q30[IVL_VISION_TERMS];
     int     shift[IVL_VISION_TERMS];  ///< a term was divided by 2^shift
     int     shift_residual;
-    int64_t x_q30[IVL_VISION_TERMS];                 ///< the unknowns
+    int64_t x_q30[IVL_VISION_TERMS];           ///< the unknowns
+    int64_t left;                              ///< sum of the squares that the solution leaves
     int64_t inverse_q20[3][IVL_VISION_TERMS];        ///< rows of the inverse of the scaled matrix that belong to the motion
 } ivl_vision_solution_t;
 

@@ -11,7 +11,7 @@ enum
 };
 
 /// Part of the picture that is used, the closing of a pair that is aimed at, and 10 mrad of attitude: docs/CAMERA.md says why.
-static const uint16_t WINDOW_W = 60, WINDOW_H = 48, HORIZON_Q12 = 410, ATTITUDE_Q16 = 655;
+static const uint16_t WINDOW_W = 56, WINDOW_H = 42, HORIZON_Q12 = 410, ATTITUDE_Q16 = 655;
 
 _Static_assert(sizeof(ivl_camera_row_t) == ROW_DOUBLES * sizeof(double), "a row is doubles and nothing else");
 
