@@ -48,8 +48,8 @@ static bool within(int64_t value, int64_t lo, int64_t hi)
 static bool cfg_is_possible(const ivl_vision_cfg_t *cfg)
 {
     return (cfg->bin == 2 || cfg->bin == 4) && within(cfg->window_w, 32, IVL_VISION_WINDOW_W) && cfg->window_w % IVL_VISION_COLUMNS == 0 &&
-           within(cfg->window_h, 24, IVL_VISION_WINDOW_H) && cfg->window_h % IVL_VISION_BANDS == 0 &&
-           within(cfg->horizon_q12, 40, 1024) && cfg->attitude_q16 <= 6554 && within(cfg->focal_q16, 16 * 65536, 128 * 65536) &&
+           within(cfg->window_h, 24, IVL_VISION_WINDOW_H) && cfg->window_h % IVL_VISION_BANDS == 0 && within(cfg->horizon_q12, 40, 1024) &&
+           cfg->attitude_q16 <= 6554 && within(cfg->focal_q16, 16 * 65536, 128 * 65536) &&
            within(cfg->centre_x_q16, 20 * 65536, 60 * 65536) && within(cfg->centre_y_q16, 15 * 65536, 45 * 65536) &&
            within(cfg->radial_q16[0], -65536, 65536) && within(cfg->radial_q16[1], -65536, 65536);
 }
@@ -187,8 +187,8 @@ static uint32_t choose_frames(const ivl_vision_cfg_t *cfg, const ivl_vision_stat
         int32_t                  p[3];
         const ivl_vision_slot_t *then = earlier(state, i);
         predict(state, frame->normal_q30, frame->t_us, frame->t_us - then->t_us, p);
-        const bool near = within(dot_q30(frame->normal_q30, p), -horizon_q30, horizon_q30) && within(p[0], -2 * horizon_q30, 2 * horizon_q30) &&
-                          within(p[1], -2 * horizon_q30, 2 * horizon_q30);
+        const bool near = within(dot_q30(frame->normal_q30, p), -horizon_q30, horizon_q30) &&
+                          within(p[0], -2 * horizon_q30, 2 * horizon_q30) && within(p[1], -2 * horizon_q30, 2 * horizon_q30);
         frames = (then->filled && near && frames == i - 1) ? i : frames;
     }
     return frames;
@@ -217,7 +217,7 @@ static ivl_vision_pair_t halved(const ivl_vision_pair_t *fine, int window_w, int
                                 .centre_y_q16 = fine->centre_y_q16 / 2 - 16384,
                                 .window_w = window_w,
                                 .window_h = window_h};
-    int16_t *then = memory + coarse.width * coarse.height;
+    int16_t          *then = memory + coarse.width * coarse.height;
     ivl_vision_image_halve(fine->now, fine->width, fine->height, memory);
     ivl_vision_image_halve(fine->then, fine->width, fine->height, then);
     coarse.now = memory;
@@ -225,8 +225,8 @@ static ivl_vision_pair_t halved(const ivl_vision_pair_t *fine, int window_w, int
     return coarse;
 }
 
-static bool fit_level(const ivl_vision_pair_t *pair, int passes, uint32_t exposure_now_us, uint32_t exposure_then_us, ivl_vision_belief_t *belief,
-                      ivl_vision_block_t block[IVL_VISION_BANDS][IVL_VISION_COLUMNS], ivl_vision_fit_t *fit)
+static bool fit_level(const ivl_vision_pair_t *pair, int passes, uint32_t exposure_now_us, uint32_t exposure_then_us,
+                      ivl_vision_belief_t *belief, ivl_vision_block_t block[IVL_VISION_BANDS][IVL_VISION_COLUMNS], ivl_vision_fit_t *fit)
 {
     ivl_vision_fit_start(belief, exposure_now_us, exposure_then_us);
     for (int i = 0; i < passes; i++)
@@ -272,12 +272,12 @@ static int64_t quadratic_q60(const ivl_vision_fit_t *fit, const int32_t e_q30[3]
 }
 
 /// Standard deviation of a cue, Q16: from the scatter along e, the part that is always uncertain, and the other cue times the uncertain normal.
-static int32_t sigma_q16(const ivl_vision_cfg_t *cfg, const ivl_vision_fit_t *fit, const int32_t e_q30[3], uint32_t gap_us, int64_t size_q16,
-                         int64_t other_q16)
+static int32_t sigma_q16(const ivl_vision_cfg_t *cfg, const ivl_vision_fit_t *fit, const int32_t e_q30[3], uint32_t gap_us,
+                         int64_t size_q16, int64_t other_q16)
 {
     const int64_t scattered_q60 = ivl_vision_clamp(quadratic_q60(fit, e_q30), (int64_t)1 << 54) / 256 * SCATTER_FACTOR_Q8;
-    const int64_t part_q22[3] = {(int64_t)(ivl_vision_sqrt((uint64_t)scattered_q60) >> 8) * 1000000 / gap_us, (size_q16 * SIGMA_NORM_Q16) >> 10,
-                                 (other_q16 * ((cfg->attitude_q16 * TURN_Q16) >> 16)) >> 10};
+    const int64_t part_q22[3] = {(int64_t)(ivl_vision_sqrt((uint64_t)scattered_q60) >> 8) * 1000000 / gap_us,
+                                 (size_q16 * SIGMA_NORM_Q16) >> 10, (other_q16 * ((cfg->attitude_q16 * TURN_Q16) >> 16)) >> 10};
     int64_t       square = 0;
     for (int i = 0; i < 3; i++)
     {
@@ -299,8 +299,8 @@ static void tangents(const int32_t n[3], int32_t forward_q30[3], int32_t left_q3
     for (int k = 0; k < 3; k++)
     {
         const int a = (k + 1) % 3, b = (k + 2) % 3;
-        left_q30[k] = (int32_t)ivl_vision_clamp((int64_t)ivl_vision_mul_q30(n[a], forward_q30[b]) - ivl_vision_mul_q30(n[b], forward_q30[a]),
-                                                IVL_VISION_ONE_Q30);
+        left_q30[k] = (int32_t)ivl_vision_clamp(
+            (int64_t)ivl_vision_mul_q30(n[a], forward_q30[b]) - ivl_vision_mul_q30(n[b], forward_q30[a]), IVL_VISION_ONE_Q30);
     }
 }
 
@@ -322,8 +322,8 @@ static int64_t larger(int64_t a, int64_t b)
 }
 
 /// Fills the cues; they are taken back if they turn out not to be valid.
-static void tell(const ivl_vision_cfg_t *cfg, const ivl_vision_belief_t *belief, const ivl_vision_fit_t *fit, const ivl_vision_frame_t *frame,
-                 ivl_vision_out_t *out)
+static void tell(const ivl_vision_cfg_t *cfg, const ivl_vision_belief_t *belief, const ivl_vision_fit_t *fit,
+                 const ivl_vision_frame_t *frame, ivl_vision_out_t *out)
 {
     int32_t forward[3], left[3];
     tangents(frame->normal_q30, forward, left);
@@ -368,12 +368,14 @@ static void remember(ivl_vision_state_t *state, const ivl_vision_belief_t *belie
     const int64_t closing = dot_q30(normal_q30, belief->p_q30);
     for (int k = 0; k < 3; k++)
     {
-        state->motion_q20_per_s[k] = (int32_t)ivl_vision_clamp((int64_t)rate_q16(belief->p_q30[k], closing, out->gap_us) * 16, IVL_VISION_ONE_Q30);
+        state->motion_q20_per_s[k] =
+            (int32_t)ivl_vision_clamp((int64_t)rate_q16(belief->p_q30[k], closing, out->gap_us) * 16, IVL_VISION_ONE_Q30);
     }
     state->motion_t_us = out->t_us;
 }
 
-static ivl_vision_status_t look(const ivl_vision_cfg_t *cfg, ivl_vision_state_t *state, const ivl_vision_frame_t *frame, ivl_vision_out_t *out)
+static ivl_vision_status_t look(const ivl_vision_cfg_t *cfg, ivl_vision_state_t *state, const ivl_vision_frame_t *frame,
+                                ivl_vision_out_t *out)
 {
     const uint32_t           frames = choose_frames(cfg, state, frame);
     const ivl_vision_slot_t *now = earlier(state, 0), *then = earlier(state, frames);
@@ -397,7 +399,8 @@ static ivl_vision_status_t look(const ivl_vision_cfg_t *cfg, ivl_vision_state_t 
     {
         return IVL_VISION_TEXTURE;
     }
-    if (!fit_level(&pair, state->predicts ? PASSES_PREDICTED : PASSES_STARTED, now->exposure_us, then->exposure_us, &belief, state->block, &fit))
+    if (!fit_level(&pair, state->predicts ? PASSES_PREDICTED : PASSES_STARTED, now->exposure_us, then->exposure_us, &belief, state->block,
+                   &fit))
     {
         return IVL_VISION_TEXTURE;
     }
@@ -425,7 +428,8 @@ void ivl_vision_step(const ivl_vision_cfg_t *cfg, ivl_vision_state_t *state, con
     state->predicts = status == IVL_VISION_VALID;
     if (status != IVL_VISION_VALID)
     {
-        *out = (ivl_vision_out_t){.t_us = frame->t_us, .gap_us = out->gap_us, .quality = out->quality, .frames = out->frames, .started = out->started};
+        *out = (ivl_vision_out_t){
+            .t_us = frame->t_us, .gap_us = out->gap_us, .quality = out->quality, .frames = out->frames, .started = out->started};
     }
     out->status = (uint8_t)status;
 }

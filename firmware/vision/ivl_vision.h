@@ -19,8 +19,8 @@ enum
     IVL_VISION_WIDTH = 80,  ///< of the binned picture that is worked on
     IVL_VISION_HEIGHT = 60,
     IVL_VISION_PIXELS = IVL_VISION_WIDTH * IVL_VISION_HEIGHT,
-    IVL_VISION_SLOTS = 4,     ///< pictures that are kept: a pair is up to three frames apart
-    IVL_VISION_COLUMNS = 4,   ///< blocks of the window, for the standard deviation
+    IVL_VISION_SLOTS = 4,    ///< pictures that are kept: a pair is up to three frames apart
+    IVL_VISION_COLUMNS = 4,  ///< blocks of the window, for the standard deviation
     IVL_VISION_BANDS = 6,
     IVL_VISION_WINDOW_W = 60,  ///< largest window: 15 pixels a block, as many as a sum of 32 bits holds
     IVL_VISION_WINDOW_H = 48,
@@ -31,16 +31,16 @@ enum
 /// A camera, and what is asked of its readings.
 typedef struct
 {
-    uint16_t        bin;             ///< pixels of the sensor, each way, that make one: 2 or 4; with a Bayer sensor 4
-    uint16_t        window_w;        ///< central part that is used, multiple of 4, 32 .. 60
-    uint16_t        window_h;        ///< multiple of 6, 24 .. 48
-    uint16_t        horizon_q12;     ///< closing of a pair over the distance that is aimed at: RREV times the time between the pictures
-    uint16_t        attitude_q16;    ///< standard deviation of the attitude that is told, rad; up to 0.1
-    int32_t         focal_q16;       ///< focal length in binned pixels, 16 .. 128
-    int32_t         centre_x_q16;    ///< principal point in binned pixels; (0, 0) is the middle of the first pixel
+    uint16_t        bin;           ///< pixels of the sensor, each way, that make one: 2 or 4; with a Bayer sensor 4
+    uint16_t        window_w;      ///< central part that is used, multiple of 4, 32 .. 60
+    uint16_t        window_h;      ///< multiple of 6, 24 .. 48
+    uint16_t        horizon_q12;   ///< closing of a pair over the distance that is aimed at: RREV times the time between the pictures
+    uint16_t        attitude_q16;  ///< standard deviation of the attitude that is told, rad; up to 0.1
+    int32_t         focal_q16;     ///< focal length in binned pixels, 16 .. 128
+    int32_t         centre_x_q16;  ///< principal point in binned pixels; (0, 0) is the middle of the first pixel
     int32_t         centre_y_q16;
-    int32_t         radial_q16[2];   ///< distortion: r' = r (1 + k1 r^2 + k2 r^4), both over the focal length
-    const uint16_t *flat_q12;        ///< gain that makes a white wall even, 4096 is 1: 16 rows of 21 nodes, 4 pixels apart; NULL: none
+    int32_t         radial_q16[2];  ///< distortion: r' = r (1 + k1 r^2 + k2 r^4), both over the focal length
+    const uint16_t *flat_q12;       ///< gain that makes a white wall even, 4096 is 1: 16 rows of 21 nodes, 4 pixels apart; NULL: none
 } ivl_vision_cfg_t;
 
 /// A picture and how the camera was held.
@@ -104,10 +104,10 @@ typedef struct
     ivl_vision_slot_t  slot[IVL_VISION_SLOTS];
     int16_t            scratch[IVL_VISION_PIXELS];  ///< the picture before it is rectified, then coarser ones
     ivl_vision_block_t block[IVL_VISION_BANDS][IVL_VISION_COLUMNS];
-    uint32_t           newest;           ///< slot of the newest picture
+    uint32_t           newest;               ///< slot of the newest picture
     int32_t            motion_q20_per_s[3];  ///< V / d of the last reading, in the axes of its newer camera
-    uint32_t           motion_t_us;      ///< the instant it belongs to
-    bool               predicts;         ///< the last reading was valid
+    uint32_t           motion_t_us;          ///< the instant it belongs to
+    bool               predicts;             ///< the last reading was valid
 } ivl_vision_state_t;
 
 /// @return false if a number of the configuration is out of its range

@@ -8,13 +8,13 @@
 
 enum
 {
-    BASIS = 5,         ///< of a pixel: 1, grey value, and the three terms of the motion
-    PRODUCTS = 15,     ///< of them, upper triangle by rows
-    POLYNOMIALS = 3,   ///< of the row, which the gain may follow
-    ROW_GAINS = 2,     ///< the first of their terms
+    BASIS = 5,        ///< of a pixel: 1, grey value, and the three terms of the motion
+    PRODUCTS = 15,    ///< of them, upper triangle by rows
+    POLYNOMIALS = 3,  ///< of the row, which the gain may follow
+    ROW_GAINS = 2,    ///< the first of their terms
     ROW_PIXELS = IVL_VISION_WINDOW_W + 2,
     MIN_PIXELS_SHARE = 2,  ///< at least one pixel of so many must be seen
-    GRADIENT_SCALE = 4  ///< a gradient is the sum of four pixels, four times the mean change over one
+    GRADIENT_SCALE = 4     ///< a gradient is the sum of four pixels, four times the mean change over one
 };
 
 /// Where a product of two terms of the basis stands among the 15.
@@ -271,8 +271,8 @@ static void scatter(const ivl_vision_block_t *block, const ivl_vision_solution_t
 }
 
 /// Variance of the motion from how much the blocks disagree: it holds whatever the residual looks like.
-static void variance(const ivl_vision_solution_t *solution, ivl_vision_block_t block[IVL_VISION_BANDS][IVL_VISION_COLUMNS], int32_t focal_q16,
-                     ivl_vision_fit_t *fit)
+static void variance(const ivl_vision_solution_t *solution, ivl_vision_block_t block[IVL_VISION_BANDS][IVL_VISION_COLUMNS],
+                     int32_t focal_q16, ivl_vision_fit_t *fit)
 {
     memset(fit->variance_q60, 0, sizeof fit->variance_q60);
     for (int i = 0; i < IVL_VISION_BANDS * IVL_VISION_COLUMNS; i++)
@@ -304,7 +304,8 @@ static int64_t contrast_q8(const ivl_vision_pair_t *pair, const ivl_vision_solut
         const int64_t diagonal_q20 = s->inverse_q20[k][IVL_VISION_MOTION + k];
         const int64_t unit_q12 = (k == 2) ? spread_q12 : 4096;
         // inverse of the normal matrix times the residual, Q20: both were divided by powers of two
-        const int64_t part = ivl_vision_scale(ivl_vision_clamp(diagonal_q20, (int64_t)1 << 36), 2 * (s->shift_residual - s->shift[IVL_VISION_MOTION + k]));
+        const int64_t part =
+            ivl_vision_scale(ivl_vision_clamp(diagonal_q20, (int64_t)1 << 36), 2 * (s->shift_residual - s->shift[IVL_VISION_MOTION + k]));
         inverse += (ivl_vision_clamp(part, (int64_t)1 << 40) * unit_q12) >> 12;
     }
     const int64_t residual_q30 = ivl_vision_scale(s->left, 30 - 2 * s->shift_residual);

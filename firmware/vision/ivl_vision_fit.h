@@ -22,9 +22,9 @@ typedef struct
 /// What is known of the two cameras, and what is believed of motion and light.
 typedef struct
 {
-    int32_t turn_q30[9];    ///< R, row by row
-    int32_t normal_q30[3];  ///< n
-    int32_t p_q30[3];       ///< displacement over distance
+    int32_t turn_q30[9];                        ///< R, row by row
+    int32_t normal_q30[3];                      ///< n
+    int32_t p_q30[3];                           ///< displacement over distance
     int32_t gain_q12[IVL_VISION_WINDOW_H + 2];  ///< of the earlier picture, for each row of the window and one above and below
     int32_t offset;
 } ivl_vision_belief_t;
@@ -32,10 +32,11 @@ typedef struct
 typedef struct
 {
     int32_t n_pixels;
-    int64_t residual;          ///< sum of the squares that the pass leaves
-    int64_t contrast_q8;       ///< least information about any part of the motion, over what noise of the size of the residual would feign; 256 is equal
+    int64_t residual;  ///< sum of the squares that the pass leaves
+    int64_t
+        contrast_q8;  ///< least information about any part of the motion, over what noise of the size of the residual would feign; 256 is equal
     int64_t variance_q60[3][3];  ///< of the motion, from the scatter of the blocks
-    int32_t step_q30[3];       ///< by how much this pass moved p
+    int32_t step_q30[3];         ///< by how much this pass moved p
 } ivl_vision_fit_t;
 
 /// A gain that makes up for the exposures.

@@ -79,7 +79,8 @@ static int32_t stretch_q16(const ivl_vision_cfg_t *cfg, int32_t r2_q16)
 /// Value at a position in 1/256 pixel, between the four pixels around it; a hole outside of them.
 static int16_t sample(const int16_t *pixel, int32_t x, int32_t y)
 {
-    if ((uint32_t)x >= (uint32_t)((IVL_VISION_WIDTH - 1) << FRACTION_BITS) || (uint32_t)y >= (uint32_t)((IVL_VISION_HEIGHT - 1) << FRACTION_BITS))
+    if ((uint32_t)x >= (uint32_t)((IVL_VISION_WIDTH - 1) << FRACTION_BITS) ||
+        (uint32_t)y >= (uint32_t)((IVL_VISION_HEIGHT - 1) << FRACTION_BITS))
     {
         return IVL_VISION_HOLE;
     }

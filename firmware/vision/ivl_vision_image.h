@@ -7,7 +7,7 @@
 
 enum
 {
-    IVL_VISION_HOLE = -1,       ///< a pixel that shows nothing
+    IVL_VISION_HOLE = -1,        ///< a pixel that shows nothing
     IVL_VISION_PIXEL_MAX = 4080  ///< the brightest pixel: 16 * 255
 };
 

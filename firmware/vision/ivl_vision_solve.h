@@ -30,7 +30,7 @@ typedef struct
     int     shift_residual;
     int64_t x_q30[IVL_VISION_TERMS];           ///< the unknowns
     int64_t left;                              ///< sum of the squares that the solution leaves
-    int64_t inverse_q20[3][IVL_VISION_TERMS];        ///< rows of the inverse of the scaled matrix that belong to the motion
+    int64_t inverse_q20[3][IVL_VISION_TERMS];  ///< rows of the inverse of the scaled matrix that belong to the motion
 } ivl_vision_solution_t;
 
 /// Solves (A + ridge) x = b; the ridge holds offset and gains, whose part of a picture without contrast would be anything.

@@ -62,7 +62,7 @@ bool ivl_vision_map(const ivl_vision_pair_t *pair, const ivl_vision_belief_t *be
     }
     for (int i = 0; i < 3; i++)
     {
-        int64_t *row = map->row_q23[i];
+        int64_t      *row = map->row_q23[i];
         const int64_t u = row[0] * 65536 / f, v = row[1] * 65536 / f;
         row[2] = (row[2] - ((u * cx + v * cy) >> 16)) >> 7;
         row[0] = u >> 7;

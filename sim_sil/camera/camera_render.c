@@ -7,7 +7,7 @@
 enum
 {
     SAMPLES_MAX = 16,
-    INTERLEAVED = 4,          ///< instants that 2 x 2 pixels share
+    INTERLEAVED = 4,  ///< instants that 2 x 2 pixels share
     UNDISTORT_ITERATIONS = 20
 };
 
@@ -125,7 +125,7 @@ static board_t board_of(const ivl_camera_t *camera, const ivl_camera_texture_t *
     const ivl_camera_params_t *p = &camera->params;
     const double               k = texture->texels_per_m, far = 1.0e9;
     board_t                    board = {.ends = p->board_x_m > 0.0 || p->board_y_m > 0.0, .background = (float)p->background};
-    const double               half_x = (p->board_x_m > 0.0) ? 0.5 * p->board_x_m : far, half_y = (p->board_y_m > 0.0) ? 0.5 * p->board_y_m : far;
+    const double half_x = (p->board_x_m > 0.0) ? 0.5 * p->board_x_m : far, half_y = (p->board_y_m > 0.0) ? 0.5 * p->board_y_m : far;
     board.x_lo = (float)((p->board_at_x_m - half_x) * k);
     board.x_hi = (float)((p->board_at_x_m + half_x) * k);
     board.y_lo = (float)((p->board_at_y_m - half_y) * k);
@@ -168,7 +168,8 @@ static void add_noise(const ivl_camera_t *camera, const ivl_sim_rng_t *rng, uint
     const uint32_t key[2] = {(uint32_t)rng->seed, (uint32_t)(rng->seed >> 32)};
     for (int x = 0; x < camera->width; x += 4)
     {
-        const uint32_t index = picture * (uint32_t)(IVL_CAMERA_WIDTH_MAX * IVL_CAMERA_HEIGHT_MAX / 4) + (uint32_t)(row * camera->width + x) / 4u;
+        const uint32_t index =
+            picture * (uint32_t)(IVL_CAMERA_WIDTH_MAX * IVL_CAMERA_HEIGHT_MAX / 4) + (uint32_t)(row * camera->width + x) / 4u;
         const uint32_t counter[4] = {index, (uint32_t)DRAW_PICTURE, (uint32_t)rng->stream, (uint32_t)(rng->stream >> 32)};
         uint32_t       bits[4];
         ivl_sim_philox(counter, key, bits);

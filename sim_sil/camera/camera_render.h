@@ -31,7 +31,7 @@ typedef struct
 {
     ivl_camera_params_t params;
     int                 width, height;
-    double              R_BC[3][3];                                        ///< as it is mounted
+    double              R_BC[3][3];                                       ///< as it is mounted
     float               u[IVL_CAMERA_WIDTH_MAX * IVL_CAMERA_HEIGHT_MAX];  ///< direction of each pixel: (u, v, 1)
     float               v[IVL_CAMERA_WIDTH_MAX * IVL_CAMERA_HEIGHT_MAX];
     float               light[IVL_CAMERA_WIDTH_MAX * IVL_CAMERA_HEIGHT_MAX];  ///< vignetting

@@ -72,10 +72,12 @@ void ivl_camera_eye_look(ivl_camera_eye_t *eye, const uint8_t *grey, double t_s,
     {
         between(eye->q_told, q_told_SB, turn);
     }
-    const double *q = q_told_SB;
-    const double  normal[3] = {2.0 * (q[0] * q[2] - q[1] * q[3]), 2.0 * (q[1] * q[2] + q[0] * q[3]), 1.0 - 2.0 * (q[0] * q[0] + q[1] * q[1])};
-    const double  sign = (turn[3] < 0.0) ? -1.0 : 1.0;
-    ivl_vision_frame_t frame = {.pixels = grey, .t_us = (uint32_t)floor(t_s * 1.0e6 + 0.5), .exposure_us = (uint32_t)floor(eye->exposure_s * 1.0e6 + 0.5)};
+    const double      *q = q_told_SB;
+    const double       normal[3] = {2.0 * (q[0] * q[2] - q[1] * q[3]), 2.0 * (q[1] * q[2] + q[0] * q[3]),
+                                    1.0 - 2.0 * (q[0] * q[0] + q[1] * q[1])};
+    const double       sign = (turn[3] < 0.0) ? -1.0 : 1.0;
+    ivl_vision_frame_t frame = {
+        .pixels = grey, .t_us = (uint32_t)floor(t_s * 1.0e6 + 0.5), .exposure_us = (uint32_t)floor(eye->exposure_s * 1.0e6 + 0.5)};
     for (int i = 0; i < 4; i++)
     {
         frame.turn_q30[i] = fixed(sign * turn[i], 30);
@@ -103,13 +105,13 @@ const ivl_sil_field_t *ivl_sil_vision_table(uint32_t *n_fields, uint32_t *item_s
 {
 #define FIELD(name, member, type, unit, doc) {name, type, offsetof(ivl_vision_out_t, member), 1, unit, 0.0, 0.0, 0.0, doc},
     static const ivl_sil_field_t FIELDS[] = {
-        FIELD("t", t_us, "u4", "us", "instant of the cues") FIELD("rrev", rrev_q16_per_s, "i4", "1/s", "closing speed over distance")
-            FIELD("of_x", of_x_q16_radps, "i4", "rad/s", "flow about body x") FIELD("of_y", of_y_q16_radps, "i4", "rad/s", "flow about body y")
-                FIELD("sigma_rrev", sigma_rrev_q16_per_s, "i4", "1/s", "standard deviation of RREV")
-                    FIELD("sigma_of", sigma_of_q16_radps, "i4", "rad/s", "standard deviation of the flow")
-                        FIELD("gap", gap_us, "u4", "us", "between the two pictures") FIELD("status", status, "u1", "1", "0: valid")
-                            FIELD("quality", quality, "u1", "1", "contrast over residual") FIELD("frames", frames, "u1", "1", "of the gap")
-                                FIELD("started", started, "u1", "1", "1: without a prediction")};
+        FIELD("t", t_us, "u4", "us", "instant of the cues") FIELD("rrev", rrev_q16_per_s, "i4", "1/s", "closing speed over distance") FIELD(
+            "of_x", of_x_q16_radps, "i4", "rad/s", "flow about body x") FIELD("of_y", of_y_q16_radps, "i4", "rad/s", "flow about body y")
+            FIELD("sigma_rrev", sigma_rrev_q16_per_s, "i4", "1/s", "standard deviation of RREV")
+                FIELD("sigma_of", sigma_of_q16_radps, "i4", "rad/s", "standard deviation of the flow")
+                    FIELD("gap", gap_us, "u4", "us", "between the two pictures") FIELD("status", status, "u1", "1", "0: valid")
+                        FIELD("quality", quality, "u1", "1", "contrast over residual") FIELD("frames", frames, "u1", "1", "of the gap")
+                            FIELD("started", started, "u1", "1", "1: without a prediction")};
 #undef FIELD
     *n_fields = (uint32_t)(sizeof FIELDS / sizeof FIELDS[0]);
     *item_size = (uint32_t)sizeof(ivl_vision_out_t);

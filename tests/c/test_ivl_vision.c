@@ -160,23 +160,6 @@ static void test_a_flat_field_makes_a_shaded_wall_even(void)
     }
 }
 
-static void test_four_by_four_pixels_of_a_colour_mosaic_are_one_grey(void)
-{
-    static uint8_t   mosaic[4 * RAW_W * RAW_H];
-    ivl_vision_cfg_t cfg = vision_cfg();
-    cfg.bin = 4;
-    for (int i = 0; i < 4 * RAW_W * RAW_H; i++)
-    {
-        const int x = i % (2 * RAW_W), y = i / (2 * RAW_W);
-        mosaic[i] = (uint8_t)((x % 2 == y % 2) ? 120 : ((x % 2) ? 40 : 200));
-    }
-    ivl_vision_image_take(&cfg, mosaic, scratch, pixel);
-    for (int i = 0; i < IVL_VISION_PIXELS; i++)
-    {
-        TEST_ASSERT_EQUAL_INT16(120 * 16, pixel[i]);
-    }
-}
-
 static void test_rectifying_keeps_a_slope_where_it_belongs(void)
 {
     ivl_vision_cfg_t cfg = vision_cfg();
@@ -481,14 +464,14 @@ static void test_the_bits_are_those_of_every_other_processor(void)
     for (int k = 0; k < 20; k++)
     {
         const ivl_vision_out_t out = look_at((k < 16) ? plaster : lines, &cfg, k, 2);
-        const uint32_t         words[] = {out.t_us,
-                                          (uint32_t)out.rrev_q16_per_s,
-                                          (uint32_t)out.of_x_q16_radps,
-                                          (uint32_t)out.of_y_q16_radps,
-                                          (uint32_t)out.sigma_rrev_q16_per_s,
-                                          (uint32_t)out.sigma_of_q16_radps,
-                                          out.gap_us,
-                                          (uint32_t)out.status << 24 | (uint32_t)out.quality << 16 | (uint32_t)out.frames << 8 | out.started};
+        const uint32_t words[] = {out.t_us,
+                                  (uint32_t)out.rrev_q16_per_s,
+                                  (uint32_t)out.of_x_q16_radps,
+                                  (uint32_t)out.of_y_q16_radps,
+                                  (uint32_t)out.sigma_rrev_q16_per_s,
+                                  (uint32_t)out.sigma_of_q16_radps,
+                                  out.gap_us,
+                                  (uint32_t)out.status << 24 | (uint32_t)out.quality << 16 | (uint32_t)out.frames << 8 | out.started};
         for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
         {
             hash = with(hash, words[i]);
@@ -511,7 +494,6 @@ int main(void)
     RUN_TEST(test_the_motion_that_explains_all_residuals_is_found);
     RUN_TEST(test_two_terms_that_are_the_same_are_not_told_apart);
     RUN_TEST(test_a_flat_field_makes_a_shaded_wall_even);
-    RUN_TEST(test_four_by_four_pixels_of_a_colour_mosaic_are_one_grey);
     RUN_TEST(test_rectifying_keeps_a_slope_where_it_belongs);
     RUN_TEST(test_a_coarse_picture_has_means_and_holes);
     RUN_TEST(test_without_motion_the_earlier_picture_is_drawn_as_it_is);

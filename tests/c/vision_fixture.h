@@ -89,7 +89,8 @@ static inline ivl_vision_cfg_t vision_cfg(void)
 
 static inline ivl_vision_frame_t vision_frame(const uint8_t *raw, uint32_t t_us)
 {
-    return (ivl_vision_frame_t){.pixels = raw, .t_us = t_us, .exposure_us = 4000, .turn_q30 = {0, 0, 0, ONE_Q30}, .normal_q30 = {0, 0, ONE_Q30}};
+    return (ivl_vision_frame_t){
+        .pixels = raw, .t_us = t_us, .exposure_us = 4000, .turn_q30 = {0, 0, 0, ONE_Q30}, .normal_q30 = {0, 0, ONE_Q30}};
 }
 
 #endif  // VISION_FIXTURE_H

@@ -2,7 +2,7 @@
 
     .venv/bin/python tools/vision/machines.py        # after `make -f tools/vision.mk`
 
-The emulator is unicorn, whose processors are QEMU's.  Instructions are counted, not cycles: no emulator has a model of those.
+The emulator is unicorn, whose processors are QEMU's.  Instructions are counted, not cycles, of which it has no model.
 """
 
 import ctypes
@@ -179,7 +179,9 @@ def sequence(texture: str, seed: int, angle_deg: float = 50.0, n: int = 0, **cam
     for i, row in enumerate(rows):
         told, last = row[14:18], rows[max(i - 1, 0), 14:18]
         turn = motion.multiply(last * np.array([-1, -1, -1, 1]), told)
-        normal = np.array([2 * (told[0] * told[2] - told[1] * told[3]), 2 * (told[1] * told[2] + told[0] * told[3]), 0.0])
+        normal = np.array(
+            [2 * (told[0] * told[2] - told[1] * told[3]), 2 * (told[1] * told[2] + told[0] * told[3]), 0.0]
+        )
         normal[2] = np.sqrt(1.0 - normal[0] ** 2 - normal[1] ** 2)
         axes = _fixed(np.concatenate([turn * np.sign(turn[3]), normal]), 30)
         times = np.array([row[0] * 1e6, 4000], dtype=np.uint32)

@@ -61,7 +61,9 @@ class Camera:
             if field is None:
                 raise ArgumentError(f"a camera has no number {name!r}; it has {', '.join(parameters())}")
             if not field.lo <= value <= field.hi:
-                raise ArgumentError(f"camera: {name} = {value:g} is not within {field.lo:g} .. {field.hi:g} {field.unit}")
+                raise ArgumentError(
+                    f"camera: {name} = {value:g} is not within {field.lo:g} .. {field.hi:g} {field.unit}"
+                )
             values[name] = float(value)
         self.values = np.array([values[name] for name in parameters()], dtype=np.float64)
 
@@ -94,7 +96,9 @@ class Texture:
             raise ArgumentError(f"a surface is a square, not {texels.shape}")
         handle = _c().ivl_sil_texture_create(texels.ctypes.data, texels.shape[0], float(length_m))
         if not handle:
-            raise ArgumentError(f"a surface of {texels.shape[0]} pixels and {length_m:g} m: neither a power of two, nor a length")
+            raise ArgumentError(
+                f"a surface of {texels.shape[0]} pixels and {length_m:g} m: neither a power of two, nor a length"
+            )
         self.handle = ctypes.c_void_p(handle)
         weakref.finalize(self, _c().ivl_sil_texture_free, self.handle)
 

@@ -97,7 +97,7 @@ def from_picture(path: Path, length_m: float = LENGTH_M) -> Texture:
     Raises:
         ArgumentError: The file is no picture.
     """
-    import matplotlib.image  # noqa: PLC0415  only here
+    import matplotlib.image
 
     try:
         image = np.asarray(matplotlib.image.imread(path), dtype=np.float64)

@@ -11,7 +11,7 @@ from ivl.cli import console
 
 app = typer.Typer(no_args_is_help=True, help="The onboard camera: how well it sees a surface.")
 
-TABLE_HELP = """Render approaches to several surfaces, estimate RREV and OF_y from the pictures, and print how wrong they are.
+TABLE_HELP = """Render approaches to several surfaces, estimate RREV and OF_y from them, and print how wrong they are.
 
 Readings with a true RREV of 2 to 6 1/s at 60 pictures a second; speed 1.5 to 3.5 m/s, 30 to 90 degrees, with 10 mrad
 of attitude error. Exit code 1 if a figure is beyond what it must show. docs/CAMERA.md explains each row.
@@ -39,10 +39,18 @@ def table(
 
 
 def _drawn(rows: list[study.Figures]) -> Table:
-    drawn = Table("surface", "valid", "bias", "sigma", "off > 25 %", "OF_y rad/s", "within 2 sigma", "ratio", "beyond", box=None)
+    drawn = Table(
+        "surface", "valid", "bias", "sigma", "off > 25 %", "OF_y rad/s", "within 2 sigma", "ratio", "beyond", box=None
+    )
     for row in rows:
         numbers = (
-            (f"{100 * row.bias:+.2f} %", f"{100 * row.sigma:.2f} %", f"{100 * row.outliers:.2f} %", f"{row.of_y:.3f}", f"{100 * row.within:.1f} %")
+            (
+                f"{100 * row.bias:+.2f} %",
+                f"{100 * row.sigma:.2f} %",
+                f"{100 * row.outliers:.2f} %",
+                f"{row.of_y:.3f}",
+                f"{100 * row.within:.1f} %",
+            )
             if row.valid > 0.0
             else ("-",) * 5
         )
