@@ -2,7 +2,7 @@
 #     make -f tools/vision.mk
 # Everything made is in build/vision/: host.so, and programs for tools/vision/machines.py.
 
-CFLAGS   := -std=c11 -O2 -ffreestanding -fno-builtin -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wshadow -Wvla -Werror -Ifirmware/vision
+CFLAGS   := -std=c11 -O3 -ffreestanding -fno-builtin -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wshadow -Wvla -Werror -Ifirmware/vision
 SOURCES  := $(wildcard firmware/vision/*.c) tools/vision/entry.c
 HEADERS  := $(wildcard firmware/vision/*.h)
 BUILD    := build/vision

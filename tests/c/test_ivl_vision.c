@@ -444,7 +444,7 @@ static void test_whatever_comes_the_answer_is_whole(void)
             TEST_ASSERT_TRUE(out.rrev_q16_per_s < 130 * 65536 && out.rrev_q16_per_s > -130 * 65536);
         }
     }
-    TEST_ASSERT_GREATER_THAN_INT(N_VISION_FUZZ, n_valid);  // it was not all garbage
+    TEST_ASSERT_GREATER_THAN_INT(N_VISION_FUZZ / 2, n_valid);  // it was not all garbage
 }
 
 static uint32_t with(uint32_t hash, uint32_t word)

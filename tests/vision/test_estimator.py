@@ -86,6 +86,7 @@ def test_every_processor_gives_the_same_bits_within_its_budget(name: str) -> Non
 
 
 def test_the_fuzzer_finds_nothing_in_a_short_time(tmp_path: Path) -> None:
+    (tmp_path / "seed").write_bytes(bytes(range(256)) + bytes(8))
     command = ["build/fuzz/fuzz_vision", "-runs=600", "-max_len=264", "-len_control=0", "-seed=1", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
