@@ -19,7 +19,7 @@ N_APPROACHES = 6
 STEEP_DEG = (60.0, 90.0)
 WIDER = 1.3
 MOST_INSTRUCTIONS = {"rv32imac": 1_700_000, "cortex-m4": 1_700_000, "aarch64": 1_300_000}
-MOST_OF_A_START = 4_500_000
+MOST_OF_A_START = 5_000_000
 
 
 def _case(name: str) -> study.Case:
