@@ -2,7 +2,7 @@
 #
 # This file decides what is set up and in which order; tools/native.mk and tools/stm32.mk compile the C code.
 # Variables: PYTHON, CC (gcc), CLANG (clang-14), FLAVOUR (release), JOBS (all cores), EXPERIMENT, PYTEST_ARGS, VEHICLE, GEAR, SIL_ARGS,
-# FUZZ_RUNS, FUZZ_ARGS, CAD_ARGS, WHEEL_ARGS, PACKETS_ARGS.
+# FUZZ_RUNS, FUZZ_ARGS, VISION_ARGS, CAD_ARGS, WHEEL_ARGS, PACKETS_ARGS.
 
 PYTHON     ?= python3
 CLANG      ?= clang-14
@@ -73,6 +73,11 @@ figs: setup build ## the paper's figures 4 to 9 from RUN=... (a sweep's run fold
 	$(say) 'figs: $(RUN)'
 	@test -n '$(RUN)' || { echo 'figs: say which run, for example: make figs RUN=runs/paper-as_simulated-bo'; exit 2; }
 	@$(BIN)/ivl figs $(RUN)
+
+.PHONY: vision
+vision: setup build ## pictures of an onboard camera, rendered and estimated: how wrong its cues are (VISION_ARGS='--approaches 400 --json')
+	$(say) 'vision: surfaces, light and lenses'
+	@$(BIN)/ivl camera table $(VISION_ARGS)
 
 .PHONY: cad
 cad: setup build openscad ## legs and jigs to print, as STL in build/cad (CAD_ARGS='--gear-set mine.yaml --gear wide'; tools/cad.py --help)
@@ -156,11 +161,11 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 # Two at a time: the first compile while pip waits for its downloads, then the longest come first.  Stages that compile into one folder are
 # ordered by their prerequisites.  test-wire flies in real time and has the machine for itself.
 TESTS := setup-dev test-c golden lint test-py pil test-links san test-mutants test-mujoco test-sil test-sweep test-report test-forms test-analysis \
-         test-flight test-physics sizes-diff
+         test-flight test-vision test-physics sizes-diff
 
 .PHONY: test
 test: ## everything below, set-up and compilers included
-	@tools/apt_install.sh $(TOOLCHAIN) $(CPP) $(CROSS_TOOLCHAIN) $(FUZZER) $(QT_LIBRARIES) $(CHROMIUM) $(OPENSCAD)
+	@tools/apt_install.sh $(TOOLCHAIN) $(CPP) $(CROSS_TOOLCHAIN) $(VISION_TOOLCHAIN) $(FUZZER) $(QT_LIBRARIES) $(CHROMIUM) $(OPENSCAD)
 	$(say) 'test: two at a time, each printed when it is over'
 	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 $(TESTS)
 	@+$(MAKE) --no-print-directory test-wire
@@ -308,6 +313,14 @@ test-sweep: setup-dev build ## sweeps on real processes: workers, clients and ce
 	$(say) 'test-sweep: pytest tests/sweep'
 	@$(BIN)/python -m pytest tests/sweep $(PYTEST_ARGS)
 
+.PHONY: test-vision
+test-vision: setup-dev build ## cues from pictures: a sample of `make vision`, a reference in floating point, other processors, a short fuzz
+	@tools/apt_install.sh $(VISION_TOOLCHAIN) $(FUZZER)
+	@+$(SUBMAKE) -f tools/vision.mk
+	@+$(NATIVE) FLAVOUR=fuzz build/fuzz/fuzz_vision
+	$(say) 'test-vision: pytest tests/vision'
+	@$(BIN)/python -m pytest tests/vision $(PYTEST_ARGS)
+
 .PHONY: test-analysis
 test-analysis: setup-dev build ## analysis and figures of campaigns, on tables with known answers
 	$(say) 'test-analysis: pytest tests/analysis'
@@ -353,6 +366,7 @@ TOOLCHAIN       := $(firstword $(CC)):gcc nm:binutils $(CLANG):clang-14
 CPP             := g++:g++
 CROSS_TOOLCHAIN := arm-none-eabi-gcc:gcc-arm-none-eabi qemu-system-arm:qemu-system-arm $(CLANG):clang-14 \
     $$(echo '\#include <string.h>' | arm-none-eabi-gcc -E -x c - > /dev/null 2>&1 || echo :libnewlib-arm-none-eabi)
+VISION_TOOLCHAIN := riscv64-unknown-elf-gcc:gcc-riscv64-unknown-elf aarch64-linux-gnu-gcc:gcc-aarch64-linux-gnu arm-none-eabi-gcc:gcc-arm-none-eabi
 FUZZER          := $(CLANG):clang-14 $$(tools/has_fuzzer.sh $(CLANG) || echo :libclang-rt-14-dev)
 CHROMIUM        := chromium:chromium
 OPENSCAD        := openscad:openscad
@@ -389,7 +403,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/vision/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/camera/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tools/vision/*.c tools/vision/include/*.h tests/app/*.[ch] firmware/sdk/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
 
 # set-up, each step once
 

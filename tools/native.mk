@@ -30,7 +30,7 @@ WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-prom
 # no contraction: the same source gives the same bits on every machine and compiler, whatever its instructions
 # the flight core also in halves, for vehicles side by side
 CFLAGS := -std=c11 $(OPTIMISE_$(FLAVOUR)) -ffp-contract=off -DIVL_SIDE_BY_SIDE -fno-math-errno -fPIC -pthread \
-          -Ifirmware/core -Isim_sil -Isim_sil/physics -Isim_sil/world
+          -Ifirmware/core -Ifirmware/vision -Isim_sil -Isim_sil/physics -Isim_sil/world -Isim_sil/camera
 LDLIBS := -lm -pthread
 
 # objects of the release flavour also carry what GCC needs to optimise library and vehicle as a whole; all others link them as they are, which
@@ -50,6 +50,7 @@ COMBINE = $(or $(COMBINE_$(FLAVOUR)),ld -r)
 FLAGS_sim_sil := -Wno-psabi -Ifirmware/app -isystem firmware/sdk
 FLAGS_sim_sil/physics := $(FLAGS_sim_sil)
 FLAGS_sim_sil/world := $(FLAGS_sim_sil)
+FLAGS_sim_sil/camera := $(FLAGS_sim_sil)
 FLAGS_sim_sil/pil := $(FLAGS_sim_sil) -Ifirmware/stm32f405
 
 # the software vehicle: the app's own sources, with the vehicle in the place of its SDK
@@ -73,6 +74,7 @@ ifeq ($(FLAVOUR),fuzz)
 FLAGS_sim_sil/crtp += -fsanitize=fuzzer-no-link
 FLAGS_sim_sil/cf   += -fsanitize-coverage=inline-8bit-counters,pc-table
 FLAGS_firmware/app += -fsanitize-coverage=inline-8bit-counters,pc-table
+FLAGS_firmware/vision += -fsanitize=fuzzer-no-link
 endif
 
 # FORMS=folder adds forms of policies (firmware/core/ivl_form.h): its sources, and its forms.h, which only ivl_form.c includes.  All other
@@ -97,7 +99,8 @@ WIDE_PART := $(patsubst %.c,%.o,$(wildcard sim_sil/physics/*.c sim_sil/world/*.c
 
 CORE    := $(patsubst %.c,$(SHARED)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
 SENSES  := firmware/app/app_senses.c
-SIM     := $(patsubst %.c,$(SHARED)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/pil/*.c) $(SENSES)) $(WIDE)
+VISION  := $(patsubst %.c,$(SHARED)/%.o,$(wildcard firmware/vision/*.c))
+SIM     := $(patsubst %.c,$(SHARED)/%.o,$(wildcard sim_sil/*.c sim_sil/physics/*.c sim_sil/world/*.c sim_sil/camera/*.c sim_sil/pil/*.c) $(SENSES)) $(VISION) $(WIDE)
 CF      := $(patsubst %.c,$(SHARED)/%.o,$(wildcard sim_sil/cf/*.c) $(filter-out $(SENSES) %/app_cpx.c %/app_rate.c,$(wildcard firmware/app/*.c)))
 SUPPORT := $(patsubst %.c,$(SHARED)/%.o,$(filter-out tests/c/test_%,$(wildcard tests/c/*.c)))
 TESTS   := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_*.c))
@@ -156,7 +159,7 @@ $(BUILD)/ivl_sil: $(CORE) $(SIM) $(CF) $(CRTP) $(SHARED)/sim_sil/crtp/crtp_main.
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) $(LTO_LINK_$(FLAVOUR)) -o $@ $(filter %.o,$^) $(LDLIBS)
 
-fuzz: $(BUILD)/fuzz_crtp
+fuzz: $(BUILD)/fuzz_crtp $(BUILD)/fuzz_vision
 
 sequences: $(BUILD)/loop_sequences
 	@timeout --verbose $(TIMEOUT_S) $< $(SEQUENCES) $(SEED)
@@ -169,6 +172,10 @@ $(BUILD)/loop_sequences: $(SHARED)/tests/fuzz/loop_sequences.o $(CORE) $(SIM) $(
 	@$(COMPILER) $(CFLAGS) $(AS_THEY_ARE) -Wl,--wrap=clock_gettime -Wl,--wrap=ivl_crtp_step -o $@ $(filter %.o,$^) $(LDLIBS)
 
 $(BUILD)/fuzz_crtp: $(SHARED)/tests/fuzz/fuzz_crtp.o $(CORE) $(SIM) $(CF) $(CRTP) $(BUILD)/objects.txt
+	@echo '  LINK  $@'
+	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
+
+$(BUILD)/fuzz_vision: $(SHARED)/tests/fuzz/fuzz_vision.o $(VISION) $(BUILD)/objects.txt
 	@echo '  LINK  $@'
 	@$(COMPILER) $(CFLAGS) -fsanitize=fuzzer -o $@ $(filter %.o,$^) $(LDLIBS)
 
@@ -268,5 +275,5 @@ $(BUILD)/objects.txt: FORCE
 $(SHARED)/widths.txt: FORCE
 	$(call remember,$(WIDE_PART))
 
--include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(SHARED)/sim_sil/crtp/crtp_main.o $(SHARED)/tests/fuzz/fuzz_crtp.o $(SHARED)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(SHARED)/tests/c/%.o) \
+-include $(patsubst %.o,%.d,$(CORE) $(SIM) $(CF) $(CRTP) $(FAKE_CF) $(SHARED)/sim_sil/crtp/crtp_main.o $(SHARED)/tests/fuzz/fuzz_crtp.o $(SHARED)/tests/fuzz/fuzz_vision.o $(SHARED)/tests/fuzz/loop_sequences.o $(SUPPORT) $(TESTS:%=$(SHARED)/tests/c/%.o) \
     $(foreach n,$(WIDTHS),$(WIDE_PART:%=$(SHARED)/lanes$n/%)))

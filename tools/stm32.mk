@@ -30,7 +30,7 @@ WARNINGS := -Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-prom
 MACHINE  := -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16
 # enums as wide as on the host: the structs of the core cross the border as they are
 CFLAGS   := -std=c11 $(OPTIMISE_$(FLAVOUR)) $(MACHINE) -DIVL_NO_TEXT -ffp-contract=off -fno-math-errno -fno-short-enums \
-            -ffunction-sections -fdata-sections -g -Ifirmware/core -Ifirmware/stm32f405
+            -ffunction-sections -fdata-sections -g -Ifirmware/core -Ifirmware/vision -Ifirmware/stm32f405
 LDFLAGS  := $(OPTIMISE_$(FLAVOUR)) $(MACHINE) -nostartfiles -static -T firmware/stm32f405/stm32f405.ld -Wl,--gc-sections \
             -Wl,--fatal-warnings -Wl,--no-enum-size-warning -Wl,--no-wchar-size-warning -Wl,-z,noexecstack
 
@@ -42,6 +42,7 @@ FLAGS_tests/c := $(FLAGS_unity) -Itests/c
 FUZZ_FLIGHTS  ?= 400
 FLAGS_test_ivl_fuzz := -DN_FLIGHTS=$(FUZZ_FLIGHTS)
 FLAGS_test_ivl_math := -DSWEEP_STRIDE=97
+FLAGS_test_ivl_vision := -DN_VISION_FUZZ=6
 # the start-up code fills and clears memory: its loops must not become calls to themselves
 FLAGS_startup := -fno-builtin
 
@@ -57,6 +58,7 @@ endif
 TARGET   := firmware/stm32f405
 PROGRAMS := tick_server replay faults
 CORE     := $(patsubst %.c,$(SHARED)/%.o,$(filter-out $(FORMS_CORE),$(wildcard firmware/core/*.c))) $(FORMS_CORE:%.c=$(BUILD)/%.o)
+VISION   := $(patsubst %.c,$(SHARED)/%.o,$(wildcard firmware/vision/*.c))
 COMMON   := $(SHARED)/$(TARGET)/startup.o $(SHARED)/$(TARGET)/semihost.o
 TESTS    := $(patsubst tests/c/%.c,%,$(wildcard tests/c/test_ivl_*.c))
 INSTALLED := host/ivl/_native/stm32f405.elf
@@ -105,7 +107,8 @@ $(BUILD)/tick_server.elf $(BUILD)/replay.elf: $(BUILD)/%.elf: $(SHARED)/$(TARGET
 $(BUILD)/faults.elf: $(SHARED)/$(TARGET)/faults.o $(COMMON) $(TARGET)/stm32f405.ld
 	$(link)
 
-$(BUILD)/test_%.elf: $(SHARED)/tests/c/test_%.o $(CORE) $(COMMON) $(SHARED)/tests/c/default_fixture.o $(SHARED)/unity.o \
+# the estimator is for a camera's processor; here its tests show that it has the same bits
+$(BUILD)/test_%.elf: $(SHARED)/tests/c/test_%.o $(CORE) $(VISION) $(COMMON) $(SHARED)/tests/c/default_fixture.o $(SHARED)/unity.o \
                      $(SHARED)/$(TARGET)/unity_output.o $(TARGET)/stm32f405.ld
 	$(link)
 

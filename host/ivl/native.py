@@ -124,6 +124,15 @@ class NativeLibrary:
         fields, item_size = self._fields(code, "ivl_sil_layout")
         return {f.name: f for f in fields}, _dtype(fields if item_size else (), item_size)
 
+    def table_of(self, call: str) -> tuple[Mapping[str, Field], np.dtype[np.void]]:
+        """Fields of a record that a part of the library has a table of its own for."""
+        function = getattr(self._c, call)
+        function.restype = ctypes.POINTER(_CField)
+        n_fields, item_size = ctypes.c_uint32(), ctypes.c_uint32()
+        rows = function(ctypes.byref(n_fields), ctypes.byref(item_size))
+        fields = tuple(_field(rows[i]) for i in range(n_fields.value))
+        return {f.name: f for f in fields}, _dtype(fields, item_size.value)
+
     def use_registers(self, bits: int | str = 0) -> int:
         """Choose the width of the registers in which rollouts stand side by side; outcomes do not depend on it.
 

@@ -16,6 +16,7 @@ from ivl import __version__, files, memory, optional
 from ivl.cli import (
     amend,
     bench,
+    camera,
     can_gateway,
     console,
     doctor,
@@ -86,6 +87,7 @@ app.command("can-gateway", help=can_gateway.HELP, short_help="Carry the link of 
 app.command("flash", help=flash.HELP)(flash.flash)
 app.command("stop", help=stop.HELP, short_help="Stop a vehicle that flies now.")(stop.stop)
 app.add_typer(site.app, name="site", short_help="Describe the room in which a drone flies.")
+app.add_typer(camera.app, name="camera", short_help="Show how well the onboard camera sees a surface.")
 app.add_typer(amend.app, name="run", short_help="Amend the outcome of a flown landing.")
 app.add_typer(family.app, name="family", short_help="Show the vehicles that a task may be flown with.")
 app.add_typer(policy.app, name="policy", short_help="Learn, show and judge policies for every approach.")
