@@ -110,7 +110,7 @@ docs: setup-dev build ## the documentation as web pages in build/docs/html, with
 .PHONY: notebook
 notebook: setup-dev build ## run the tutorial as a notebook, with its figures, into build/notebook
 	$(say) 'notebook: docs/TUTORIAL.md, cell by cell'
-	@$(within) $(BIN)/python tools/notebook.py --check
+	@$(within) $(BIN)/python tools/notebook.py --check  # examples/tutorial.ipynb is what the page gives
 
 ##@ The vehicle's processor
 
@@ -351,9 +351,9 @@ format: setup-dev ## format C and Python in place
 	@$(BIN)/clang-format -i $(C_FILES) < /dev/null
 
 .PHONY: bench
-bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 and UDP against real time, sweeps on 1 and 2 cores
+bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 and UDP against real time, Gymnasium, sweeps on 1 and 2 cores
 	$(say) 'bench'
-	@$(BIN)/ivl bench --pil --udp
+	@$(BIN)/ivl bench --pil --udp --gym
 	$(say) 'bench: sweeps, overhead of a task, and what follows for larger machines'
 	@$(BIN)/python tools/scaling.py
 
