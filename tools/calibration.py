@@ -2,6 +2,7 @@
 
     .venv/bin/python tools/calibration.py                       200 drones, 4 flights each
     .venv/bin/python tools/calibration.py --drones 50 --json
+    .venv/bin/python tools/calibration.py --figure docs/figures/belief_ranks.png
 
 Each drone is a member of the family of experiments/transfer.yaml. It flies what `ephe_belief` asks for. Then the rank
 of each of its true numbers among the particles is taken (Talts et al. 2018, Validating Bayesian inference algorithms
@@ -16,16 +17,19 @@ import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import chisquare
+from scipy.stats import binom, chisquare
+from threadpoolctl import threadpool_limits
 
 from ivl import experiment, family
 from ivl.belief import recording
 from ivl.belief.simulator import Simulator
 from ivl.learners.base import LANDED, RECORDING
 from ivl.outcome import four_leg
+from ivl.plots import style
 
 EXPERIMENT = "experiments/transfer.yaml"
 LEVELS = (0.5, 0.9)
@@ -39,17 +43,20 @@ def main() -> int:
     parser.add_argument("--flights", type=int, default=4)
     parser.add_argument("--seed", type=int, default=6000, help="of the drones")
     parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
+    parser.add_argument("--figure", type=Path, help="draw the ranks, too")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    os.environ["OMP_NUM_THREADS"] = "1"
     _simulator(args.seed)  # the bank is flown once, and kept
     one = partial(_drone, args.seed, args.flights)
     rows = []
-    with ProcessPoolExecutor(args.workers) as pool:
+    # a worker that shares its core with threads of others takes three times as long
+    with ProcessPoolExecutor(args.workers, initializer=threadpool_limits, initargs=(1,)) as pool:
         for row in pool.map(one, range(args.drones)):
             rows.append(row)
             print(f"drone {len(rows)} of {args.drones}", file=sys.stderr, flush=True)
     result = summary(rows)
+    if args.figure is not None:
+        draw(result, args.figure)
     if args.json:
         print(json.dumps(result))
     else:
@@ -118,6 +125,28 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
             "rms": float(np.sqrt(((expected - rate) ** 2).mean())),
         },
     }
+
+
+@style.drawing
+def draw(result: dict[str, Any], path: Path) -> None:
+    """Ranks of each number, with the band that holds nine of ten bars of a belief that is right."""
+    n, rows = result["n_drones"], result["parameters"]
+    low, high = binom.interval(LEVELS[-1], n, 1.0 / N_BINS)
+    n_columns = 5
+    figure = style.new_figure(9.0, 1.7 * -(-len(rows) // n_columns))
+    axes = figure.subplots(-(-len(rows) // n_columns), n_columns, sharey=True, squeeze=False)
+    for axis, (name, row) in zip(axes.flat, rows.items(), strict=False):
+        axis.axhspan(low, high, color=style.GREY, alpha=0.25, linewidth=0)
+        axis.bar((np.arange(N_BINS) + 0.5) / N_BINS, row["counts"], 0.9 / N_BINS, color=style.BLUE)
+        axis.set_title(name, fontsize=style.NORMAL)
+        style.finish(axis)
+    for axis in axes.flat[len(rows) :]:
+        axis.set_axis_off()
+    for axis in axes[:, 0]:
+        axis.set_ylabel("drones")
+    for axis in axes[-1]:
+        axis.set_xlabel("rank of the truth")
+    style.save(figure, [path], dpi=100)
 
 
 def _simulator_names() -> tuple[str, ...]:
