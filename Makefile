@@ -334,8 +334,6 @@ lint: setup-dev build golden-build-O0 ## formatting, types, rules of the firmwar
 	@$(BIN)/clang-format --dry-run -Werror $(C_FILES) < /dev/null
 	$(say) 'lint: rules of the firmware core'
 	@tools/check_core.sh build/O0/firmware/core build/release/firmware/core
-	$(say) 'lint: flight core for other compilers and systems'
-	@tools/check_portable.sh
 	$(say) 'lint: equation references'
 	@$(BIN)/python tools/check_refs.py
 	$(say) 'lint: docs/PARAMS.md is what the table of parameters gives'
@@ -401,7 +399,7 @@ distclean: clean ## remove .venv as well
 	$(say) 'distclean: $(VENV)'
 	@rm -rf $(VENV) host/*.egg-info
 
-C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h tests/portable/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
+C_FILES = $(wildcard firmware/core/*.[ch] firmware/app/*.[ch] firmware/stm32f405/*.[ch] sim_sil/*.[ch] sim_sil/physics/*.[ch] sim_sil/world/*.[ch] sim_sil/pil/*.[ch] sim_sil/cf/*.[ch] sim_sil/cf/sdk/*.h sim_sil/crtp/*.[ch] tests/c/*.[ch] tests/crtp/*.[ch] tests/forms/*.[ch] tests/fuzz/*.c tests/stm32/*.c tests/app/*.[ch] firmware/sdk/*.h tools/*.c examples/*.c examples/*.h examples/*.cpp)
 
 # set-up, each step once
 

@@ -89,7 +89,7 @@ static inline float app_sigma_m(float var_x_m2, float var_y_m2, float var_z_m2)
 {
     const float xy = (var_x_m2 >= var_y_m2) ? var_x_m2 : var_y_m2;
     // a variance that is no number wins, so that it is seen
-    return ivl_sqrt((xy >= var_z_m2) ? xy : var_z_m2) + 0.0f * (var_x_m2 + var_y_m2 + var_z_m2);
+    return sqrtf((xy >= var_z_m2) ? xy : var_z_m2) + 0.0f * (var_x_m2 + var_y_m2 + var_z_m2);
 }
 
 /// Distance of a motor from the b_x and b_y axes, from the length of the arm.

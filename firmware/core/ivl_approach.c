@@ -53,7 +53,7 @@ void ivl_approach_aim(const ivl_cfg_t *cfg, ivl_approach_t *approach, const ivl_
     const ivl_vec3_t from = {approach->from_x_mps, 0.0f, approach->from_z_mps};
     approach->aim = ivl_region_aim(cfg, room, approach->p_W_m, from, approach->asked);
     const float dx = approach->aim.vx_mps - from.x, dz = approach->aim.vz_mps - from.z;
-    const float dv_mps = ivl_sqrt(dx * dx + dz * dz);
+    const float dv_mps = sqrtf(dx * dx + dz * dz);
     approach->dir_x = (dv_mps > 0.0f) ? dx / dv_mps : 0.0f;
     approach->dir_z = (dv_mps > 0.0f) ? dz / dv_mps : 1.0f;
     approach->speed_mps = 0.0f;

@@ -14,7 +14,7 @@ static ivl_quat_t turned(ivl_quat_t q, ivl_vec3_t half)
         q.z + q.w * half.z + q.x * half.y - q.y * half.x,
         q.w - q.x * half.x - q.y * half.y - q.z * half.z,
     };
-    const float scale = 1.0f / ivl_sqrt(t.x * t.x + t.y * t.y + t.z * t.z + t.w * t.w);
+    const float scale = 1.0f / sqrtf(t.x * t.x + t.y * t.y + t.z * t.z + t.w * t.w);
     return (ivl_quat_t){t.x * scale, t.y * scale, t.z * scale, t.w * scale};
 }
 

@@ -160,7 +160,7 @@ static void filter_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, iv
     const float         bias_m = distance->has_range ? cfg->range_bias_m : 0.0f;
     ceiling->d_ceil_m = filter->d_m - (filter->v_mps - 0.5f * dv_mps) * t_s - gain.p_m;
     ceiling->v_close_mps = filter->v_mps - dv_mps + gain.v_mps;
-    ceiling->d_sigma_m = ivl_sqrt(ivl_filter_d_variance(filter, t_s, cfg->kf_q_m2ps3) + bias_m * bias_m);
+    ceiling->d_sigma_m = sqrtf(ivl_filter_d_variance(filter, t_s, cfg->kf_q_m2ps3) + bias_m * bias_m);
     ceiling->valid = distance->n_taken > 0u;
 }
 
@@ -199,7 +199,7 @@ static void range_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, con
     const float drift_m = cfg->kf_v_sigma_mps * distance->since_s;
     ceiling->d_ceil_m = distance->range_d_m - v_mps * distance->since_s;
     ceiling->v_close_mps = v_mps;
-    ceiling->d_sigma_m = ivl_sqrt(cfg->range_sigma_m * cfg->range_sigma_m + cfg->range_bias_m * cfg->range_bias_m + drift_m * drift_m);
+    ceiling->d_sigma_m = sqrtf(cfg->range_sigma_m * cfg->range_sigma_m + cfg->range_bias_m * cfg->range_bias_m + drift_m * drift_m);
     ceiling->valid = distance->n_taken > 0u;
 }
 

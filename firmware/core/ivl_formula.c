@@ -3,8 +3,6 @@
 
 #include <math.h>
 
-#include "ivl_root.h"
-
 // a first-order low-pass has forgotten 95 % of its start after this many time constants
 static const float SETTLED_TAUS = 3.0f;
 #define SETTLED_N 3u
@@ -44,7 +42,7 @@ ivl_formula_distance_t ivl_formula_compute(const ivl_cfg_t *cfg, float rrev_per_
         const float denom_var = rate_var + 4.0f * rrev_per_s * rrev_per_s * rrev_var;
         return (ivl_formula_distance_t){
             .d_m = d_m,
-            .sigma_m = ivl_sqrt(a_var + d_m * d_m * denom_var) * fabsf(per_denom),
+            .sigma_m = sqrtf(a_var + d_m * d_m * denom_var) * fabsf(per_denom),
             .valid = true,
         };
     }

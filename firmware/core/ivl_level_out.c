@@ -89,7 +89,7 @@ static ivl_reference_t brake(const ivl_cfg_t *cfg, ivl_state_t *state)
     ivl_level_t          *level = &state->level;
     ivl_vec3_t           *hold = &state->p_hold_W_m;
     const float           dt_s = state->derived.dt_s, vx = level->vx_mps, vy = level->vy_mps;
-    const float           speed_mps = ivl_sqrt(vx * vx + vy * vy), dv_mps = cfg->approach_accel_mps2 * dt_s;
+    const float           speed_mps = sqrtf(vx * vx + vy * vy), dv_mps = cfg->approach_accel_mps2 * dt_s;
     const float           lost = (speed_mps > dv_mps) ? dv_mps / speed_mps : 1.0f;
     const float           fall_mps = descends(state) ? DESCENT_MPS : 0.0f;
     const ivl_reference_t ref = {

@@ -1,11 +1,10 @@
 /// @file ivl_math.h
 /// Vectors, rotations and the few functions that the core needs instead of libm.
-/// Only + - * /, ivl_sqrt, fabsf and comparisons: the bits are the same on every IEEE-754 machine when contraction is off.  Pure, O(1).
+/// Only + - * /, sqrtf, fabsf and comparisons: the bits are the same on every IEEE-754 machine when contraction is off.  Pure, O(1).
 #ifndef IVL_MATH_H
 #define IVL_MATH_H
 #include <math.h>
 
-#include "ivl_root.h"
 #include "ivl_types.h"
 
 /// Rotation matrix by columns: the axes of B expressed in W.

@@ -8,8 +8,6 @@
 #else
 #include <math.h>
 
-#include "ivl_root.h"
-
 typedef float ivl_num_t;
 
 /// A constant as a number.
@@ -18,7 +16,7 @@ typedef float ivl_num_t;
 /// One of two numbers.  Which of them are computed is not said: both must be harmless.
 #define ivl_pick(condition, yes, no) ((condition) ? (yes) : (no))
 
-#define ivl_root(x)      ivl_sqrt(x)
+#define ivl_root(x)      sqrtf(x)
 #define ivl_magnitude(x) fabsf(x)
 #endif
 #endif  // IVL_NUM_H

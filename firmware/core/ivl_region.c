@@ -26,8 +26,8 @@ static ivl_aim_t nominal(const ivl_cfg_t *cfg, ivl_aim_t asked)
 {
     // what is asked is within speed_max, so no root is of a negative number
     const float square = cfg->speed_mps_max * cfg->speed_mps_max;
-    const float vz = most(asked.vz_mps, least(cfg->region_vz_mps, ivl_sqrt(square - asked.vx_mps * asked.vx_mps)));
-    const float vx = most(asked.vx_mps, least(cfg->region_vx_mps, ivl_sqrt(square - vz * vz)));
+    const float vz = most(asked.vz_mps, least(cfg->region_vz_mps, sqrtf(square - asked.vx_mps * asked.vx_mps)));
+    const float vx = most(asked.vx_mps, least(cfg->region_vx_mps, sqrtf(square - vz * vz)));
     return (ivl_aim_t){.vx_mps = vx, .vz_mps = vz};
 }
 
@@ -49,21 +49,21 @@ static float accel_mps2(const ivl_cfg_t *cfg, float vbat_V, float dir_z)
     const float full_mps2 = 4.0f * cfg->motor_thrust_N_max * battery_share(cfg, vbat_V) / cfg->mass_kg;
     const float used_mps2 = g + cfg->thrust_use_norm * most(full_mps2 - g, 0.0f);
     const float up_mps2 = g * dir_z;
-    const float a = ivl_sqrt(up_mps2 * up_mps2 + used_mps2 * used_mps2 - g * g) - up_mps2;
+    const float a = sqrtf(up_mps2 * up_mps2 + used_mps2 * used_mps2 - g * g) - up_mps2;
     return ivl_clamp(a, ACCEL_MPS2_MIN, cfg->approach_accel_mps2);
 }
 
 // Largest v with v t + v^2 / 2a within the room: the way of a time t, and a ramp from rest or braking                [MODEL eq. 15.3, 15.4]
 static float within(float a_mps2, float t_s, float room_m)
 {
-    return a_mps2 * (ivl_sqrt(t_s * t_s + 2.0f * most(room_m, 0.0f) / a_mps2) - t_s);
+    return a_mps2 * (sqrtf(t_s * t_s + 2.0f * most(room_m, 0.0f) / a_mps2) - t_s);
 }
 
 // the clamps take the slower end for what is no number: where nothing is to be accelerated, or a measured value is bad
 ivl_aim_t ivl_region_aim(const ivl_cfg_t *cfg, const ivl_room_t *room, ivl_vec3_t p_W_m, ivl_vec3_t v_W_mps, ivl_aim_t asked)
 {
     ivl_aim_t   aim = nominal(cfg, asked);
-    const float dx = aim.vx_mps - v_W_mps.x, dz = aim.vz_mps - v_W_mps.z, dv = ivl_sqrt(dx * dx + dz * dz);
+    const float dx = aim.vx_mps - v_W_mps.x, dz = aim.vz_mps - v_W_mps.z, dv = sqrtf(dx * dx + dz * dz);
     const float dir_z = (dv > 0.0f) ? dz / dv : 1.0f;
     aim.accel_mps2 = accel_mps2(cfg, room->vbat_V, dir_z);
 

@@ -59,7 +59,7 @@ static bool pose_good(const ivl_in_t *in, float q_norm2)
 
 static void accept(ivl_sense_t *sense, const ivl_in_t *in, float q_norm2, float age_s)
 {
-    const float   scale = 1.0f / ivl_sqrt(q_norm2);
+    const float   scale = 1.0f / sqrtf(q_norm2);
     ivl_sample_t *s = &sense->sample;
     s->t_us = in->t_us;
     s->t_pose_us = in->t_pose_us;
