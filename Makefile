@@ -107,6 +107,16 @@ example-cpp: golden-build-O0 ## the flight core in a bare C loop and in a C++ mo
 	$(say) 'example-cpp: examples'
 	@+$(NATIVE) FLAVOUR=O0 examples
 
+.PHONY: docs
+docs: setup-dev build ## the documentation as web pages in build/docs/html, with the reference generated from the package
+	$(say) 'docs: pages, warnings as errors'
+	@$(within) $(BIN)/python tools/docs/build.py
+
+.PHONY: notebook
+notebook: setup-dev build ## run the tutorial as a notebook, with its figures, into build/notebook
+	$(say) 'notebook: docs/TUTORIAL.md, cell by cell'
+	@$(within) $(BIN)/python tools/notebook.py --check  # examples/tutorial.ipynb is what the page gives
+
 ##@ The vehicle's processor
 
 .PHONY: firmware
@@ -161,7 +171,7 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 # Two at a time: the first compile while pip waits for its downloads, then the longest come first.  Stages that compile into one folder are
 # ordered by their prerequisites.  test-wire flies in real time and has the machine for itself.
 TESTS := setup-dev test-c golden lint test-py pil test-links san test-mutants test-mujoco test-sil test-sweep test-report test-forms test-analysis \
-         test-flight test-vision test-physics sizes-diff
+         test-flight test-vision test-physics sizes-diff docs notebook
 
 .PHONY: test
 test: ## everything below, set-up and compilers included
@@ -352,9 +362,9 @@ format: setup-dev ## format C and Python in place
 	@$(BIN)/clang-format -i $(C_FILES) < /dev/null
 
 .PHONY: bench
-bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 and UDP against real time, sweeps on 1 and 2 cores
+bench: setup-dev build firmware ## rollouts and steps per second per core, ratio to MuJoCo, emulated STM32 and UDP against real time, Gymnasium, sweeps on 1 and 2 cores
 	$(say) 'bench'
-	@$(BIN)/ivl bench --pil --udp
+	@$(BIN)/ivl bench --pil --udp --gym
 	$(say) 'bench: sweeps, overhead of a task, and what follows for larger machines'
 	@$(BIN)/python tools/scaling.py
 
@@ -419,7 +429,7 @@ $(VENV)/.stamp-run: $(BIN)/python pyproject.toml tools/constraints.txt
 # what is needed to run is a part of it, and is not installed twice
 $(VENV)/.stamp-dev: $(BIN)/python pyproject.toml tools/constraints.txt
 	$(say) 'setup: installing ivl and what it, its tests and lint need'
-	@$(pip) --editable '.[link,sweep,report,live,gym,optimisers,cluster,rerun,cfclient,test,mujoco,lint,stm32]'
+	@$(pip) --editable '.[link,sweep,report,live,gym,optimisers,cluster,rerun,cfclient,test,mujoco,lint,stm32,docs,notebook]'
 	@touch $(VENV)/.stamp-run $@
 
 $(UNITY)/unity.c: tools/get_unity.sh tools/unity.txt | $(BIN)/python

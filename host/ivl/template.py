@@ -1,12 +1,13 @@
-"""New files to begin with: an experiment with a comment for each field, and schemas for editors."""
+"""New files to begin with: an experiment with a comment for each field, vehicles, gears, and schemas for editors."""
 
+import re
 import textwrap
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
 
-from ivl import experiment, files, yamlfile
+from ivl import experiment, files, model, references, yamlfile
 from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 
@@ -25,10 +26,7 @@ def write_experiment(path: Path, base: str) -> Experiment:
     Raises:
         ConfigError: The file exists or cannot be written, its name is none for an experiment, or the base is wrong.
     """
-    if path.exists():
-        raise ConfigError(f"{path}: exists already: choose another name")
-    if path.suffix not in (".yaml", ".yml"):
-        raise ConfigError(f"{path}: is to be a YAML file: call it {path.with_suffix('.yaml')}")
+    _check_new(path)
     data = {**experiment.load(base).model_dump(), "name": path.stem, "flown": []}
     chosen = experiment.from_data(data, path.name)
     head = (
@@ -36,11 +34,53 @@ def write_experiment(path: Path, base: str) -> Experiment:
         "under overrides, with value, unit and source. An editor completes and checks this file by the schema that "
         "`ivl schema experiment` prints."
     )
+    _write(path, f"{_comment(head)}\n{commented(chosen)}")
+    return chosen
+
+
+def write_vehicle(path: Path, base: str) -> None:
+    """Write a copy of a vehicle's file, with its sources and comments, under the name of the new file.
+
+    Raises:
+        ConfigError: The file exists or cannot be written, or there is no such vehicle.
+    """
+    _check_new(path)
+    model.load_vehicle(base)
+    _write_copy(path, base, model.VEHICLES_DIR)
+
+
+def write_gear_set(path: Path, base: str) -> None:
+    """Write a copy of a file of landing gears, likewise.
+
+    Raises:
+        ConfigError: The file exists or cannot be written, or there is no such set.
+    """
+    _check_new(path)
+    model.list_gears(base)
+    _write_copy(path, base, model.GEARS_DIR)
+
+
+def _write_copy(path: Path, base: str, folder: Path) -> None:
+    """Copy a file of the package, or one that was given by its path; only its name changes."""
+    source = Path(base) if references.is_path(base) else folder / f"{base}.yaml"
+    text, n = re.subn(r"^name: .*$", f"name: {path.stem}", source.read_text(encoding="utf-8"), count=1, flags=re.M)
+    if n != 1:
+        raise ConfigError(f"{base}: has no line with its name")
+    _write(path, text)
+
+
+def _check_new(path: Path) -> None:
+    if path.exists():
+        raise ConfigError(f"{path}: exists already: choose another name")
+    if path.suffix not in (".yaml", ".yml"):
+        raise ConfigError(f"{path}: is to be a YAML file: call it {path.with_suffix('.yaml')}")
+
+
+def _write(path: Path, text: str) -> None:
     try:
-        files.write(path, f"{_comment(head)}\n{commented(chosen)}")
+        files.write(path, text)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {files.reason(error)}") from error
-    return chosen
 
 
 def commented(model: BaseModel) -> str:

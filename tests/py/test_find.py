@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import ivl
-from ivl import cli, experiment, native, sensing, template
+from ivl import cli, experiment, model, native, sensing, template
 from ivl.cli.listing import Kind
 
 
@@ -47,6 +47,31 @@ def test_a_new_experiment_flies_what_its_base_flies(base: str, tmp_path: Path) -
         line = next(i for i, line in enumerate(text.splitlines()) if line.startswith(f"{name}:"))
         assert text.splitlines()[line - 1].startswith("# "), f"{name} has no comment"
     assert max(len(line) for line in text.splitlines() if line.startswith("#")) <= 120
+
+
+@pytest.mark.parametrize("base", model.list_vehicles())
+def test_a_new_vehicle_is_a_copy_with_a_name_of_its_own(base: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    assert cli.run(["init", str(path), "--vehicle", base]) == 0
+    copy, shipped = model.load_vehicle(str(path)), model.load_vehicle(base)
+    assert (copy.name, copy.doc, copy.quantities) == ("mine", shipped.doc, shipped.quantities)
+
+
+@pytest.mark.parametrize("base", model.list_gear_sets())
+def test_new_landing_gears_are_a_copy(base: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    assert cli.run(["init", str(path), "--gear-set", base]) == 0
+    for gear in model.list_gears(base):
+        assert model.load_gear(gear, str(path)).quantities == model.load_gear(gear, base).quantities
+
+
+def test_one_kind_of_file_is_written_and_its_base_exists(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.yaml"
+    assert cli.run(["init", str(path), "--vehicle", "habas2021", "--gear-set", "table1"]) == 2
+    assert cli.run(["init", str(path), "--vehicle", "habas2020"]) == 2
+    assert cli.run(["init", str(path), "--gear-set", "table2"]) == 2
+    assert "did you mean 'habas2021'" in capsys.readouterr().err
+    assert not path.exists()
 
 
 def test_a_file_that_exists_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

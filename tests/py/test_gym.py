@@ -31,6 +31,27 @@ def test_the_checker_of_gymnasium_has_nothing_to_say() -> None:
         assert made.reset(seed=1)[0].shape == (5,)
 
 
+def test_the_vector_form_is_made_and_flown_without_a_warning() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        envs = gymnasium.make_vec(ivl.gym.ENV_ID, num_envs=3, task=NOISE)
+        seen, _ = envs.reset(seed=1)
+        assert envs.observation_space.contains(seen)
+        envs.action_space.seed(1)
+        for _ in range(150):
+            seen, rewards, ends, cuts, _ = envs.step(envs.action_space.sample())
+            assert envs.observation_space.contains(seen)
+            assert (rewards.shape, ends.dtype, cuts.dtype) == ((3,), np.dtype(bool), np.dtype(bool))
+        envs.close()
+
+
+def test_speed_is_measured_for_steps_and_for_the_landings_that_end() -> None:
+    from ivl.gym import speed
+
+    rates = speed.measure(16, 60)
+    assert rates["gym_steps_per_s_16"] > rates["gym_landings_per_s_16"] > 0.0
+
+
 @pytest.mark.parametrize("n_wait", [3, 20, 45])
 def test_a_flip_is_the_landing_that_the_simulator_flies(env: LandingEnv, n_wait: int) -> None:
     env.reset(seed=11)

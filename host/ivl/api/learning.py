@@ -41,6 +41,8 @@ def learn(
 ) -> LearnRun:
     """Learn to land in the simulator of this process, and judge what was learned; what `ivl learn` does.
 
+    For example::
+
         ivl.learn("paper_vertical", learner="bo", budget=80)
         ivl.learn(ivl.Task(vehicle="habas2021", gear="wide_long", speed_mps=3.0, angle_deg=60.0), budget=80)
         ivl.learn("paper_vertical", **{"sense.latency": 0.02, "reward.options.weights": {"legs": 2.0}})

@@ -45,7 +45,7 @@ class LearnRun:
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """What identifies the run: versions, digests, seeds, parameters."""
+        """What identifies the run, namely versions, digests, seeds, parameters."""
         return read_manifest(self.folder)
 
     @property

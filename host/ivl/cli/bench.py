@@ -47,6 +47,7 @@ def bench(
     mujoco: Annotated[bool, typer.Option(help="Compare with MuJoCo.")] = True,
     on_chip: Annotated[bool, typer.Option("--pil", help="Time the emulated STM32 in the loop as well.")] = False,
     over_udp: Annotated[bool, typer.Option("--udp", help="Time a software vehicle over UDP as well.")] = False,
+    with_gym: Annotated[bool, typer.Option("--gym", help="Time the environment of Gymnasium as well.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Measure speed; HELP is the text that people see."""
@@ -59,12 +60,22 @@ def bench(
         result |= pil.measure()
     if over_udp:
         result |= _udp_rates()
+    if with_gym:
+        result |= _gym_rates(world)
     if as_json:
         console.print_json(result)
     else:
         for name, value in result.items():
             text = value if isinstance(value, str) else console.number(value, 3 if name.startswith("occupancy") else 1)
             console.out.print(f"{name:36s} {text}")
+
+
+def _gym_rates(world: World) -> dict[str, float]:
+    """Rates of the vector form, and of landings as an agent explores that are flown as many at once without it."""
+    from ivl.gym import speed  # asks for gymnasium
+
+    rate, _, _ = _fly(world, Landings(2048, 2.5, 90.0, (0.5, 8.0), (0.0, 12.0e-3)), 512)
+    return {**speed.measure(64), **speed.measure(512), "gym_beside_rollouts_per_s_512": rate}
 
 
 def measure(world: World, n: int) -> dict[str, Any]:

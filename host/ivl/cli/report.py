@@ -23,12 +23,16 @@ Examples:
       another file, and look at it at once
   ivl report runs/paper --landings 200
       fewer landings, a smaller file
+  ivl report runs/ephe runs/bo --out both.html
+      two or more runs of ivl learn side by side: what each found, and how it went there
 """
 
 
 def report(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.")],
-    out: Annotated[Path | None, typer.Option(help="File to write; default: report.html in RUN.")] = None,
+    run: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folder; several: compare them.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File to write; default: report.html in RUN, comparison.html here for several.")
+    ] = None,
     landings: Annotated[int, typer.Option(help="Carry at most this many landings.", min=1, max=100_000)] = 1500,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in the web browser.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object; progress goes to stderr.")] = False,
@@ -38,6 +42,9 @@ def report(
         from ivl import report as reports  # plotly and pandas take a second to load
     except ModuleNotFoundError as error:
         raise IvlError(f"{error.name} is not installed: pip install 'ivl[report,sweep]'") from error
+    if len(run) > 1:
+        _compare(run, out or Path("comparison.html"), open_, as_json)
+        return
     columns = (TextColumn("flying landings again"), BarColumn(), MofNCompleteColumn())
     progress = Progress(*columns, console=console.err, transient=True)
     task = progress.add_task("", total=None)
@@ -47,7 +54,7 @@ def report(
         progress.update(task, completed=done, total=n)
 
     try:
-        made = reports.write(run, out, landings, on_landing)
+        made = reports.write(run[0], out, landings, on_landing)
     finally:
         if progress.live.is_started:
             progress.stop()
@@ -70,5 +77,23 @@ def report(
         console.out.print(
             f"{made.path}: {made.size_bytes / 1e6:.1f} MB, {made.n_landings} landings to replay",
         )
-    if open_ and not webbrowser.open(made.path.resolve().as_uri()):
-        raise IvlError(f"{made.path}: no web browser was found to open it with")
+    if open_:
+        _open(made.path)
+
+
+def _compare(runs: list[Path], path: Path, open_: bool, as_json: bool) -> None:
+    """Write the page of several runs."""
+    from ivl.report.comparison import write_comparison
+
+    size = write_comparison(runs, path)
+    if as_json:
+        console.print_json({"path": str(path), "size_bytes": size, "runs": len(runs)})
+    else:
+        console.out.print(f"{path}: {size / 1e6:.1f} MB, {len(runs)} runs side by side")
+    if open_:
+        _open(path)
+
+
+def _open(path: Path) -> None:
+    if not webbrowser.open(path.resolve().as_uri()):
+        raise IvlError(f"{path}: no web browser was found to open it with")
