@@ -49,6 +49,8 @@ from ivl.links.options import Options
 from ivl.outcome import four_leg
 from ivl.rewards import REWARDS
 from ivl.settings import read_mapping
+from ivl.site import file as site_file
+from ivl.site import place
 from ivl.source import RolloutSource, TrialSource, WorldSource
 from ivl.store import EARLIER_FILE, SCHEMA_VERSION, RunStore, check_version, read_manifest, write_json
 from ivl.world import World
@@ -156,7 +158,7 @@ def run(
         copies = copies | {EARLIER_FILE: content}
         manifest["earlier"] = {"runs": list(told.runs), "sha256": hashlib.sha256(content).hexdigest()}
     with ExitStack() as stack:
-        simulator, notes = simulator_of(chosen, threads, hooks.on_bank)
+        simulator, notes = simulator_of(chosen, threads, hooks.on_bank, in_room=uri is not None)
         notes += [] if told is None else told.notes
         if hooks.on_note:
             for note in notes:
@@ -277,9 +279,16 @@ def _open_source(
 
 
 def simulator_of(
-    chosen: Experiment, threads: int | None = None, on_bank: Callable[[int, int], None] | None = None
+    chosen: Experiment,
+    threads: int | None = None,
+    on_bank: Callable[[int, int], None] | None = None,
+    in_room: bool = False,
 ) -> tuple[Simulator | None, list[str]]:
-    """Simulated vehicles for a learner that begins with them, and why there are none."""
+    """Simulated vehicles for a learner that begins with them, and why there are none.
+
+    In a room with a site file they have any battery between just charged and too empty to begin, which lasts for many
+    flights; elsewhere each flight has a battery of the vehicle file.
+    """
     if not LEARNERS[chosen.learner.name].cls.uses_simulator:
         return None, []
     if chosen.policy.form != forms.PAPER:
@@ -287,8 +296,12 @@ def simulator_of(
     home = chosen.nominal_world_of(chosen.gear)
     if not family.is_uncertain(home, chosen.family):
         return None, ["learned from flights alone: no parameter of the vehicle has a sigma"]
+    flight = chosen.flight
+    if in_room and chosen.site is not None and home.params.values[place.BATTERY] > 0.0:
+        home = home.changed(**place.batteries(site_file.load(chosen.site)))
+        flight = replace(flight, battery_lasts=True)
     kin = family.of(home, chosen.family)
-    return Simulator.of(kin, chosen.flight, threads=threads, progress=on_bank), []
+    return Simulator.of(kin, flight, threads=threads, progress=on_bank), []
 
 
 def kept_earlier(folder: Path) -> Earlier | None:

@@ -352,6 +352,38 @@ def test_the_discrepancy_is_a_covariance_of_the_stated_size() -> None:
     assert np.allclose(posterior.discrepancy(3.0), 9.0 * d)
 
 
+# ---- a battery that lasts
+
+
+def test_conditions_are_about_a_battery_that_lasts_and_spread_without_one() -> None:
+    scale = emulator.Scale(BOUNDS[:, 0], BOUNDS[:, 1], np.array([3.5, 0.02]), np.array([0.2, 0.01]))
+    quantiles = np.stack([np.linspace(0.01, 0.99, 99), np.full(99, 0.5)], axis=1)
+    spread, lasting = scale.conditions(quantiles), scale.conditions(quantiles, 3.8)
+    assert spread[:, 0].mean() == pytest.approx(3.5)
+    assert spread[:, 0].std() > 0.15
+    assert lasting[:, 0].mean() == pytest.approx(3.8)
+    assert lasting[:, 0].std() < 0.05
+    assert np.array_equal(spread[:, 1], lasting[:, 1])
+    never = replace(scale, sigma=np.array([0.0, 0.01]))  # no flight of the bank has a battery
+    assert np.isnan(never.conditions(quantiles, 3.8)[:, 0]).all()
+
+
+def test_the_next_flight_is_expected_with_the_battery_of_the_last_one_only_if_it_lasts(simulator: Simulator) -> None:
+    nothing = np.full((1, recording.N), np.nan)
+    told = nothing.copy()
+    told[0, recording.CONDITIONS] = 3.71, 0.01
+    for lasts in (False, True):
+        learner = learner_of(replace(simulator, flight=replace(FLIGHT, battery_lasts=lasts)), n_particles=32)
+        for features in (told, nothing):  # a flight that told no voltage changes nothing
+            learner.tell(learner.ask()[:1], np.full(1, 10.0), {LANDED: np.zeros(1, dtype=bool), RECORDING: features})
+        assert learner._belief is not None
+        voltage = learner._belief.battery_V
+        assert voltage == 3.71 if lasts else np.isnan(voltage)
+        again = learner_of(replace(simulator, flight=replace(FLIGHT, battery_lasts=lasts)), seed=7, n_particles=32)
+        again.load_state_dict(json.loads(json.dumps(learner.state_dict(), allow_nan=False)))
+        assert np.array_equal(again.ask(), learner.ask())
+
+
 # ---- decision
 
 

@@ -60,6 +60,27 @@ def put(path: str, value: Any) -> Change:
 # ---- the file
 
 
+def test_a_belief_in_a_room_knows_any_battery_of_the_day(
+    write: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[tuple[dict[str, float], bool]] = []
+    monkeypatch.setattr(
+        run.Simulator, "of", lambda kin, flight, **_: made.append((dict(kin.world.params.values), flight.battery_lasts))
+    )
+    there = experiment.load(FLIGHT, [], site=write(measured))
+    for in_room in (False, True):
+        run.simulator_of(there, in_room=in_room)
+    (home, lasts), (room, lasts_in_room) = made
+    assert (lasts, lasts_in_room) == (False, True)
+    assert room["battery.voltage"] == pytest.approx((4.2 + 3.7) / 2)
+    even = np.random.default_rng(1).uniform(3.7, 4.2, 100_000)
+    assert room["battery.voltage_scatter"] == pytest.approx(even.std(), rel=0.01)
+    assert {name for name in home if home[name] != room[name]} == {"battery.voltage", "battery.voltage_scatter"}
+    mains = experiment.load(FLIGHT, ["battery.voltage=0", "battery.voltage_scatter=0"], site=write(measured))
+    run.simulator_of(mains, in_room=True)
+    assert made[-1] == (mains.nominal_world_of(mains.gear).params.values, False)
+
+
 def test_new_file_loads_as_it_is_and_check_names_every_placeholder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

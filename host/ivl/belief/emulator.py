@@ -44,6 +44,9 @@ _ROWS_MAX = 1000
 _NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 40, 0.3
 _BATCH, _RATE = 400, 1e-3
 
+_BATTERY_CHANGES_V = 0.03
+"""From a flight to the next one with the same battery, as measured in the hover."""
+
 Rows = npt.NDArray[Any]
 """Rows of numbers in single or double precision, shape (n, ...)."""
 Net = Sequence[tuple[FloatArray, FloatArray]]
@@ -86,13 +89,17 @@ class Scale:
         others = (conditions - self.mean) / np.where(self.sigma > 0.0, self.sigma, 1.0)
         return np.concatenate([policy, np.where(np.isfinite(others), others, 0.0)], axis=1)
 
-    def conditions(self, quantiles: FloatArray) -> FloatArray:
+    def conditions(self, quantiles: FloatArray, battery_V: float = np.nan) -> FloatArray:
         """Conditions, shape (n, 2), of quantiles, shape (n, 2): a normal voltage, a uniform overshoot.
 
-        One that no flight of the bank has is unknown.
+        One that no flight of the bank has is unknown. `battery_V` is the voltage of the flight before, if this one has
+        the same battery.
         """
         spread = np.stack([ndtri(quantiles[:, 0]), np.sqrt(3.0) * (2.0 * quantiles[:, 1] - 1.0)], axis=1)
-        return np.asarray(np.where(self.sigma > 0.0, self.mean + self.sigma * spread, np.nan))
+        mean, sigma = self.mean.copy(), self.sigma.copy()
+        if np.isfinite(battery_V):
+            mean[0], sigma[0] = battery_V, min(_BATTERY_CHANGES_V, sigma[0])
+        return np.asarray(np.where(self.sigma > 0.0, mean + sigma * spread, np.nan))
 
 
 @dataclass(frozen=True)

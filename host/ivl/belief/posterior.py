@@ -119,6 +119,8 @@ class Belief:
         self._prior_b = np.linalg.inv(recordings.between + discrepancy(trust.discrepancy))
         self._beta = _BETA_START
         self.evidence: Evidence | None = None
+        self.battery_V = np.nan
+        """Voltage with which the next flight is expected; NaN: any, spread as in the bank."""
         self.z = np.array([kin.draw(rng)[0] for _ in range(n_particles)])
 
     def log_likelihood(self, z: FloatArray, evidence: Evidence | None) -> FloatArray:
@@ -223,19 +225,26 @@ class Belief:
     def rates(self, theta: FloatArray, n_most: int = RATED) -> FloatArray:
         """Landing rate of policies, shape (m, dim), of particles, shape (at most `n_most`, m).
 
-        Each particle flies under other conditions, spread as in the bank.
+        Each particle flies under other conditions, spread as in the bank, or about `battery_V`.
         """
         n = min(len(self.z), n_most)
         at = np.arange(n)
         quantiles = np.stack([(at + 0.5) / n, (0.5 + at * _GOLDEN) % 1.0], axis=1)
-        conditions = np.repeat(self._recordings.scale.conditions(quantiles), len(theta), axis=0)
+        conditions = np.repeat(self._recordings.scale.conditions(quantiles, self.battery_V), len(theta), axis=0)
         flights = np.repeat(self.z[:n], len(theta), axis=0), np.tile(theta, (n, 1)), conditions
         return self._landings.rate(*flights).reshape(n, len(theta))
+
+    def rates_under(self, theta: FloatArray, conditions: FloatArray) -> FloatArray:
+        """Landing rates of policies, shape (m, dim), each under conditions of its own, shape (m, 2): shape (m,)."""
+        n, m = min(len(self.z), RATED), len(theta)
+        flights = np.repeat(self.z[:n], m, axis=0), np.tile(theta, (n, 1)), np.tile(conditions, (n, 1))
+        return np.asarray(self._landings.rate(*flights).reshape(n, m).mean(axis=0))
 
     def rate_of_one(self, theta: FloatArray) -> FloatArray:
         """Landing rate of policies, shape (m, dim), each of one particle under drawn conditions: shape (m,)."""
         chosen = self._rng.integers(len(self.z), size=len(theta))
-        conditions = self._recordings.scale.conditions(self._rng.uniform(_TINY, 1.0 - _TINY, (len(theta), 2)))
+        quantiles = self._rng.uniform(_TINY, 1.0 - _TINY, (len(theta), 2))
+        conditions = self._recordings.scale.conditions(quantiles, self.battery_V)
         return self._landings.rate(self.z[chosen], theta, conditions)
 
     def digest(self) -> str:

@@ -75,6 +75,8 @@ class Flight:
         start: How a rollout begins.
         bounds: Box of the policies, shape (dim, 2), in the units of the form.
         approaches: Box of speed and angle, shape (2, 2), in place of the one approach; None: there is one.
+        battery_lasts: Whether a flight has the battery of the one before, a little emptier, as in a room; otherwise
+            each flight has one of its own.
     """
 
     speed_mps: float
@@ -83,6 +85,7 @@ class Flight:
     start: str
     bounds: FloatArray
     approaches: FloatArray | None = None
+    battery_lasts: bool = False
 
     @property
     def box(self) -> FloatArray:

@@ -153,10 +153,23 @@ class EpheBelief(EpheMemory):
         assert self._belief is not None
         options = self.options
         size = options.local * (1.0 if self.model_fits else options.wide)
-        expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)
+        self._belief.battery_V = self._battery_V()
+        expected = self._rates_flown(self._theta, self._conditions) if len(self._theta) else np.empty(0)
         self._corrected = correction.fit(self._theta, self._told, expected, options.local_length * self.sigma0, size)
         self._choice, self._margin_rate = decide.safest(self._belief, self._corrected, self._bounds, self._rng)
         self._normal = self._imagine_on_belief(*self._normal)
+
+    def _battery_V(self) -> float:
+        """Voltage of the last flight that told one, if the next has the same battery; else NaN."""
+        told = self._conditions[np.isfinite(self._conditions[:, 0]), 0]
+        return float(told[-1]) if self._simulator.flight.battery_lasts and len(told) else np.nan
+
+    def _rates_flown(self, theta: FloatArray, conditions: FloatArray) -> FloatArray:
+        """Landing rates that the belief, uncorrected, expects of flights; if a battery lasts, each with its own."""
+        assert self._belief is not None
+        if self._simulator.flight.battery_lasts:
+            return self._belief.rates_under(theta, conditions)
+        return np.asarray(self._belief.rates(theta).mean(axis=0))
 
     def _remember(self, theta: FloatArray, rewards: FloatArray, meta: Meta) -> None:
         """Add flights to the evidence, with what was expected of them."""
@@ -166,7 +179,9 @@ class EpheBelief(EpheMemory):
             raise LearnerError(f"tell: meta[{LANDED!r}] is missing: a belief must be told which rollouts landed")
         landed = meta[LANDED].astype(bool)
         self._predicted = self._predict(theta[0], features[0, recording.CONDITIONS])
-        self._foreseen = np.append(self._foreseen, self.expected_rates(theta))
+        conditions = features[:, recording.CONDITIONS]
+        foreseen = self._corrected(theta, self._rates_flown(theta, conditions))
+        self._foreseen = np.append(self._foreseen, foreseen)
         self._theta = np.vstack([self._theta, theta])
         self._features = np.vstack([self._features, emulator.used(features)])
         self._conditions = np.vstack([self._conditions, features[:, recording.CONDITIONS]])
@@ -231,7 +246,8 @@ class EpheBelief(EpheMemory):
         self._normal = (mu, sigma)
         self._belief.load(state["belief"], self._evidence() if len(self._theta) else None)
         size = self.options.local * (1.0 if self.model_fits else self.options.wide)
-        expected = self._belief.rates(self._theta).mean(axis=0) if len(self._theta) else np.empty(0)
+        self._belief.battery_V = self._battery_V()
+        expected = self._rates_flown(self._theta, self._conditions) if len(self._theta) else np.empty(0)
         self._corrected = correction.fit(
             self._theta, self._told, expected, self.options.local_length * self.sigma0, size
         )

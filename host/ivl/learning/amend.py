@@ -65,7 +65,7 @@ def amend(folder: Path, number: int, change: Change, who: str, why: str, threads
             raise ConfigError(f"{folder}: rollout {number} says so already: {said[0]}")
         utc = datetime.now(UTC).isoformat(timespec="seconds")
         made = Amendment(int(row.trial[0]), int(row.episode[0]), int(row.idx[0]), utc, who, why, *said)
-        simulator, _ = run.simulator_of(experiment, threads)
+        simulator, _ = run.simulator_of(experiment, threads, in_room=True)
         trials = trials_of(experiment, n_trials or 1)
         learning = LearningRun(trials, None, store, simulator, run.kept_earlier(folder), begin_anew=True)
         store.amend(after, "" if counts else f"amended: {why}", made, lambda: learning.tell_again(made.trial))

@@ -6,6 +6,7 @@ What the site says becomes overrides of the experiment with the site as their so
 has the same room. Doing it again changes nothing.
 """
 
+import math
 from typing import TYPE_CHECKING
 
 from ivl import model
@@ -15,6 +16,9 @@ from ivl.site.file import SiteFile
 
 if TYPE_CHECKING:
     from ivl.experiment import Experiment
+
+BATTERY = "battery.voltage"
+"""Voltage at rest; a vehicle for which it is 0 has a supply that never sags."""
 
 
 def settings(site: SiteFile) -> dict[str, float]:
@@ -29,6 +33,15 @@ def settings(site: SiteFile) -> dict[str, float]:
         values |= {f"firmware.fence_{axis}_min": span[0], f"firmware.fence_{axis}_max": span[1]}
     measured = {"sense.latency": cues.latency_s, "world.sensed_gap_offset": cues.plane_above_m}
     return values | {name: value for name, value in measured.items() if value is not None}
+
+
+def batteries(site: SiteFile) -> dict[str, float]:
+    """World parameters of a day's batteries: at rest anywhere between just charged and too empty to begin.
+
+    Mean and standard deviation of an even spread over that range.
+    """
+    full_V, least_V = site.battery.full_V, site.battery.rest_V_min
+    return {BATTERY: 0.5 * (full_V + least_V), f"{BATTERY}_scatter": (full_V - least_V) / math.sqrt(12.0)}
 
 
 def at(experiment: "Experiment", site: SiteFile, label: str) -> "Experiment":
