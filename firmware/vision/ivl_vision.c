@@ -266,7 +266,9 @@ static int64_t quadratic_q60(const ivl_vision_fit_t *fit, const int32_t e_q30[3]
     for (int k = 0; k < 9; k++)
     {
         const int64_t ee_q30 = ivl_vision_shift((int64_t)e_q30[k / 3] * e_q30[k % 3], 30);
-        sum += ivl_vision_shift((fit->variance_q60[k / 3][k % 3] >> 16) * (ee_q30 >> 8), 6);
+        // a larger variance is of no use, and its product would not fit
+        const int64_t variance_q44 = ivl_vision_clamp(fit->variance_q60[k / 3][k % 3] >> 16, (int64_t)1 << 40);
+        sum += ivl_vision_shift(variance_q44 * (ee_q30 >> 8), 6);
     }
     return (sum > 0) ? sum : 0;
 }
@@ -284,7 +286,7 @@ static int32_t sigma_q16(const ivl_vision_cfg_t *cfg, const ivl_vision_fit_t *fi
         const int64_t held = ivl_vision_clamp(part_q22[i], (int64_t)1 << 30);
         square += held * held;
     }
-    return (int32_t)(ivl_vision_sqrt((uint64_t)square) >> 6);
+    return (int32_t)(ivl_vision_sqrt((uint64_t)square) >> 6) + 1;  // nothing is known exactly
 }
 
 /// Directions along the surface: forward, which is the camera's x turned into it, and left of that.

@@ -14,7 +14,8 @@ enum
     ROW_GAINS = 2,    ///< the first of their terms
     ROW_PIXELS = IVL_VISION_WINDOW_W + 2,
     MIN_PIXELS_SHARE = 2,  ///< at least one pixel of so many must be seen
-    GRADIENT_SCALE = 4     ///< a gradient is the sum of four pixels, four times the mean change over one
+    GRADIENT_SCALE = 4,    ///< a gradient is the sum of four pixels, four times the mean change over one
+    STEEPEST = 8192        ///< of a gradient, a power of two
 };
 
 /// Where a product of two terms of the basis stands among the 15.
@@ -69,6 +70,11 @@ static void add_pixels(const view_t *view, const int16_t *const warped[3], const
         const int32_t qx = rounded_q12((w[1] - w[-1] + n[1] - n[-1]) * facing_q12);
         const int32_t qy = rounded_q12((down - up + n[width] - n[-width]) * facing_q12);
         const int32_t qz = -rounded_q12(view->u_q12[i] * qx + view->v_q12 * qy);
+        // steeper than from black to white: products of 15 such would not fit
+        if ((uint32_t)((qx + STEEPEST) | (qy + STEEPEST) | (qz + STEEPEST)) >= 2u * STEEPEST)
+        {
+            continue;
+        }
         const int32_t r = n[0] - grey;
         s.normal[0] += 1;
         s.normal[1] += grey;

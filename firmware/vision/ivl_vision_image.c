@@ -39,7 +39,7 @@ static void gains_of_row(const uint16_t *flat_q12, int y, int32_t gain_q12[IVL_V
 static int16_t evened(int32_t value, int32_t gain_q12)
 {
     const int32_t even = (value * gain_q12 + ONE_Q12 / 2) / ONE_Q12;
-    return (int16_t)((even > INT16_MAX / 2) ? INT16_MAX / 2 : even);
+    return (int16_t)((even > IVL_VISION_PIXEL_MAX) ? IVL_VISION_PIXEL_MAX : even);
 }
 
 static void bin_and_even(const ivl_vision_cfg_t *cfg, const uint8_t *raw, int16_t *out)

@@ -7,8 +7,8 @@
 
 enum
 {
-    IVL_VISION_HOLE = -1,        ///< a pixel that shows nothing
-    IVL_VISION_PIXEL_MAX = 4080  ///< the brightest pixel: 16 * 255
+    IVL_VISION_HOLE = -1,         ///< a pixel that shows nothing
+    IVL_VISION_PIXEL_MAX = 11500  ///< brightest pixel after the flat field: the squares of 15 such fit into 31 bits
 };
 
 /// Bins, evens out and rectifies a picture of the sensor.

@@ -18,7 +18,7 @@ N_APPROACHES = 6
 # a few approaches, each with one error of attitude: steep ones, in which that counts less
 STEEP_DEG = (60.0, 90.0)
 WIDER = 1.3
-MOST_INSTRUCTIONS = {"rv32imac": 1_700_000, "cortex-m4": 1_700_000, "aarch64": 1_300_000}
+MOST_INSTRUCTIONS = {"rv32imac": 1_700_000, "cortex-m4": 1_700_000, "aarch64": 1_400_000}
 MOST_OF_A_START = 5_000_000
 
 
