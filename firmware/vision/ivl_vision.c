@@ -116,7 +116,7 @@ static void multiply(const int32_t a[9], const int32_t b[9], int32_t ab[9])
     }
 }
 
-/// All that is told in the axes of the last camera is told in those of the new one from now on.
+/// Turns the kept motions and rotations from the axes of the last camera into those of the new one.
 static void turn_memory(ivl_vision_state_t *state, const int32_t turn_q30[4])
 {
     int32_t r[9];

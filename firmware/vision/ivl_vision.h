@@ -35,7 +35,7 @@ typedef struct
     uint16_t        window_w;      ///< central part that is used, multiple of 4, 32 .. 60
     uint16_t        window_h;      ///< multiple of 6, 24 .. 48
     uint16_t        horizon_q12;   ///< closing of a pair over the distance that is aimed at: RREV times the time between the pictures
-    uint16_t        attitude_q16;  ///< standard deviation of the attitude that is told, rad; up to 0.1
+    uint16_t        attitude_q16;  ///< standard deviation of the given attitude, rad; up to 0.1
     int32_t         focal_q16;     ///< focal length in binned pixels, 16 .. 128
     int32_t         centre_x_q16;  ///< principal point in binned pixels; (0, 0) is the middle of the first pixel
     int32_t         centre_y_q16;

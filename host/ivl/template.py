@@ -1,5 +1,6 @@
 """New files to begin with: an experiment with a comment for each field, vehicles, gears, and schemas for editors."""
 
+import json
 import re
 import textwrap
 from pathlib import Path
@@ -63,7 +64,8 @@ def write_gear_set(path: Path, base: str) -> None:
 def _write_copy(path: Path, base: str, folder: Path) -> None:
     """Copy a file of the package, or one that was given by its path; only its name changes."""
     source = Path(base) if references.is_path(base) else folder / f"{base}.yaml"
-    text, n = re.subn(r"^name: .*$", f"name: {path.stem}", source.read_text(encoding="utf-8"), count=1, flags=re.M)
+    name = f"name: {json.dumps(path.stem, ensure_ascii=False)}"  # in quotes: a file may be called yes.yaml
+    text, n = re.subn(r"^name: .*$", lambda _: name, source.read_text(encoding="utf-8"), count=1, flags=re.M)
     if n != 1:
         raise ConfigError(f"{base}: has no line with its name")
     _write(path, text)

@@ -10,7 +10,7 @@
 #include "ivl_vision.h"
 #include "sil.h"
 
-/// A row of a motion: a pose, and the attitude that the estimator is told.
+/// A row of a motion: a pose, and the attitude that the estimator gets.
 typedef struct
 {
     ivl_camera_pose_t pose;

@@ -57,6 +57,13 @@ def test_a_new_vehicle_is_a_copy_with_a_name_of_its_own(base: str, tmp_path: Pat
     assert (copy.name, copy.doc, copy.quantities) == ("mine", shipped.doc, shipped.quantities)
 
 
+@pytest.mark.parametrize("name", ["yes", "12", "null", "1e3"])
+def test_a_new_vehicle_keeps_a_name_that_yaml_would_read_as_something_else(name: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{name}.yaml"
+    assert cli.run(["init", str(path), "--vehicle", "habas2021"]) == 0
+    assert model.load_vehicle(str(path)).name == name
+
+
 @pytest.mark.parametrize("base", model.list_gear_sets())
 def test_new_landing_gears_are_a_copy(base: str, tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"

@@ -1,4 +1,4 @@
-"""Approaches to look along: constant velocity, a body that swings, and an attitude that is told with errors."""
+"""Approaches to look along: constant velocity, a body that swings, and an attitude estimate with errors."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class Approach:
         rrev_per_s: RREV at the first and at the last picture.
         rate_hz: Pictures a second.
         swing_rad: Amplitude of the body's roll and pitch.
-        attitude_rad: Standard deviation of the attitude that is told, one error for the whole approach.
+        attitude_rad: Standard deviation of the attitude estimate, one error for the whole approach.
         gyro_radps: Standard deviation of the rate at which that error grows.
     """
 

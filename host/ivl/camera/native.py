@@ -13,7 +13,9 @@ import numpy.typing as npt
 from ivl import native
 from ivl.errors import ArgumentError, NativeError
 
-ROW_DOUBLES = 18  # of a motion: time, position, quaternion x y z w, velocity, rates, quaternion that is told
+ROW_DOUBLES = (
+    18  # of a motion: time, position, quaternion x y z w, velocity, rates, quaternion as the estimator gets it
+)
 ONE_Q16 = 65536.0  # the estimator's unit
 STATUS = ("valid", "first", "input", "texture", "residual", "range", "uncertain")  # ivl_vision_status_t
 _RESULTS = ("", "the estimator refuses this camera", "there is not enough memory")

@@ -16,6 +16,8 @@ from ivl import files
 from ivl.api.runs import LearnRun, load
 from ivl.errors import ConfigError, StoreError
 from ivl.optional import needed
+from ivl.outcome import FOUR_LEG_MIN
+from ivl.plots import style
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
@@ -90,7 +92,7 @@ def _row(name: str, run: LearnRun) -> dict[str, str]:
         "vehicle": f"{chosen.vehicle}, {chosen.gear}",
         "approach": f"{chosen.speed_mps:g} m/s, {chosen.angle_deg:g} deg",
         "rollouts flown": str(len(flown)),
-        "of them landed": _percent((flown["n_legs"] >= 3).mean()),
+        "of them landed": _percent((flown["n_legs"] >= FOUR_LEG_MIN).mean()),
         "trials solved": solved,
         "rollouts until convergence, median": _median(trials["rollouts_to_convergence"]),
         "the recommendation lands": _percent(trials["check_rate_four_leg_norm"].mean()),
@@ -107,11 +109,10 @@ def _median(values: "pd.Series") -> str:
     return "none converged" if known.empty else f"{known.median():g} ({len(known)} of {len(values)} trials)"
 
 
+@style.drawing
 def _picture(runs: Sequence[tuple[str, LearnRun]], column: str, label: str) -> str:
     """Mean over the trials of each run, by rollouts flown, as a PNG in base64."""
-    from matplotlib.figure import Figure  # a figure of its own: no window, no state
-
-    figure = Figure(figsize=(7, 3.5), layout="constrained")
+    figure = style.new_figure(7.0, 3.5)
     axes = figure.subplots()
     for name, run in runs:
         grouped = run.episodes().groupby("episode")
