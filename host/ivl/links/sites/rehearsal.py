@@ -71,6 +71,11 @@ class Rehearsal(Room):
         if self._day is not None:
             self._day.hovers()
 
+    def rest_V(self) -> float:
+        """As the base on a rehearsed day; else the battery that a software vehicle tells of drives no motors."""
+        rest_V = super().rest_V()
+        return math.nan if self._day is None else rest_V
+
     def rotor_V(self, landing: Landing) -> float:
         """As the base on a rehearsed day; else the battery that a software vehicle tells of drives no motors."""
         return math.nan if self._day is None else super().rotor_V(landing)
