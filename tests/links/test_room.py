@@ -190,7 +190,7 @@ def test_battery_is_known_and_changed_before_a_policy_is_chosen(
     known_V = source.battery_V()
     assert script.asked == ["battery 3.6"]
     assert np.isnan(known_V), "without a rehearsed day that battery drives no motors"
-    monkeypatch.setattr(type(source._site), "rest_V", Room.rest_V)
+    monkeypatch.setattr(type(source._site), "_battery_V", Room._battery_V)
     assert source.battery_V() == recording.hover_V(source.world, source._experiment.flight, 4.0)
 
 
@@ -487,6 +487,8 @@ def test_a_run_goes_on_over_another_link_with_another_vehicle_and_says_so(
         fly(second.uri, resume=True, rehearse=True)
         with pytest.raises(StoreError, match="it is flown in a room, and now would be not flown in a room"):
             fly(second.uri, resume=True, other_world=True)
+        with pytest.raises(StoreError, match="cannot be resumed without its vehicle: add --rehearse"):
+            run.run(chosen, tmp_path / "run", resume=True)
     assert f"the link was {first.uri}, and is {second.uri}" in notes
     assert any(note.startswith("the vehicle was 00515649") and note.endswith("2") for note in notes)
     assert script.asked.count("place") == 2

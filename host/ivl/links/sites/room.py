@@ -128,7 +128,11 @@ class Room:
             self._operator.change_battery(vehicle.battery_V, needed_V)
             vehicle.pause(0.5)  # what was sent before is not what the new battery says
             vehicle.hear_battery(_VOLTAGE_S)
-        return vehicle.battery_V
+        return self._battery_V()
+
+    def _battery_V(self) -> float:
+        """Voltage at rest, now, of the battery that drives the motors; NaN: nobody knows."""
+        return self._vehicle.battery_V
 
     # ---- recovery
 
@@ -176,7 +180,7 @@ class Room:
         form = experiment.policy.shape
         return Upcoming(
             rollout.stream + 1, experiment.budget, form, rollout.theta, experiment.policy.bounds,
-            self._visit.forecasts.of(rollout.theta),
+            self._visit.forecasts.of(rollout.theta, self._battery_V()),
             self._start_W_m, self._room.home_m,
         )  # fmt: skip
 
