@@ -36,6 +36,7 @@ typedef struct
     float dt_s;
     float tan_tilt_cmd_max;
     float cos_tilt_abort;
+    ivl_surface_t surface;
     bool  cfg_good;  ///< false: ivl_cfg_check refused the configuration, the core stays in IDLE
 } ivl_derived_t;
 
@@ -56,10 +57,10 @@ typedef struct
 typedef struct
 {
     bool  rises;   ///< on the way up, from the begin of the approach on
-    float z_W_m;   ///< height at which to hover in the end
+    float h_m;     ///< height along the surface's normal at which to hover in the end
     float rest_s;  ///< how long the reference has been at rest there
-    float vx_mps;  ///< velocity of the reference along the ceiling, once the vehicle rises no more
-    float vy_mps;
+    float along_mps;  ///< velocity of the reference along the surface, once the vehicle comes no nearer: forward
+    float vy_mps;     ///< and to the left
 } ivl_level_t;
 
 typedef struct
