@@ -3,13 +3,6 @@
 
 #include "ivl_level_out.h"
 
-// straight down; before a slope that the vehicle would come down on, along it.  One that is flatter than 45 degrees is landed on
-static ivl_vec3_t down(const ivl_surface_t *surface)
-{
-    const bool is_steep = (surface->cos < 0.0f) && (surface->sin > -surface->cos);
-    return is_steep ? (ivl_vec3_t){surface->cos, 0.0f, -surface->sin} : (ivl_vec3_t){0.0f, 0.0f, -1.0f};
-}
-
 ivl_reference_t ivl_landing_next(const ivl_cfg_t *cfg, ivl_state_t *state)
 {
     const float     dt_s = state->derived.dt_s;
@@ -26,8 +19,10 @@ ivl_reference_t ivl_landing_next(const ivl_cfg_t *cfg, ivl_state_t *state)
     }
     if (hold->z > cfg->land_height_m)
     {
-        ref.v_W_mps = ivl_scale(down(&state->derived.surface), cfg->land_speed_mps);
-        *hold = ivl_add(*hold, ivl_scale(ref.v_W_mps, dt_s));
+        ref.v_W_mps.x = state->derived.surface.aside * cfg->land_speed_mps;
+        ref.v_W_mps.z = -cfg->land_speed_mps;
+        hold->x += ref.v_W_mps.x * dt_s;
+        hold->z -= cfg->land_speed_mps * dt_s;
     }
     else
     {

@@ -19,8 +19,7 @@ float ivl_level_out_rise_m(const ivl_cfg_t *cfg, const ivl_surface_t *surface, f
     const float kept_mps2 = IVL_LIFT_NORM_MIN * cfg->gravity_mps2;
     const float twice_brake_mps2 = 2.0f * surface->brake_mps2;
     // the thrust that fades with motor_lag adds this much speed, and adds it late; a slow vehicle turns before that
-    const float lift_mps2 = (surface->cos > 0.0f) ? surface->cos * ivl_clamp(thrust_mps2 - kept_mps2, 0.0f, thrust_mps2) : 0.0f;
-    const float more_mps = lift_mps2 * cfg->motor_lag_s;
+    const float more_mps = ivl_clamp(thrust_mps2 - kept_mps2, 0.0f, thrust_mps2) * cfg->motor_lag_s;
     const float late_mps = 2.0f * v_close_mps + more_mps - twice_brake_mps2 * cfg->motor_lag_s;
     const float braked_m = (v_close_mps * v_close_mps + more_mps * ((late_mps > 0.0f) ? late_mps : 0.0f)) / twice_brake_mps2;
     return braked_m + v_close_mps * surface->late_s;
@@ -88,16 +87,14 @@ static void turn(const ivl_cfg_t *cfg, ivl_state_t *state)
     level->h_m = ivl_clamp(level->h_m, far_m + off_m, h_m - off_m);
 }
 
-// No error of position or velocity is left to the controller: it keeps the vehicle level below a ceiling, with the least thrust that it has; what
-// is ahead of the vehicle is braked before by a tilt, and what is below it by thrust.
-static ivl_reference_t rise(const ivl_cfg_t *cfg, const ivl_surface_t *surface, const ivl_sample_t *sample)
+// No error of position or velocity is left to the controller: it keeps the vehicle level below a ceiling, with the least thrust that it has; before
+// another surface it tilts the vehicle back, or pushes.
+static ivl_reference_t rise(const ivl_surface_t *surface, const ivl_sample_t *sample)
 {
-    const float fall_mps2 = (1.0f - IVL_LIFT_NORM_MIN) * cfg->gravity_mps2;
-    const float push_mps2 = (surface->cos < 0.0f) ? cfg->approach_accel_mps2 : fall_mps2;
     return (ivl_reference_t){
         .p_W_m = sample->p_WB_m,
         .v_W_mps = sample->v_WB_mps,
-        .a_W_mps2 = {0.0f - surface->sin * cfg->approach_accel_mps2, 0.0f, -surface->cos * push_mps2},
+        .a_W_mps2 = ivl_surface_vec3(surface, 0.0f, 0.0f, surface->brake_mps2),
     };
 }
 
@@ -136,7 +133,7 @@ ivl_reference_t ivl_level_out_next(const ivl_cfg_t *cfg, ivl_state_t *state)
     {
         turn(cfg, state);
     }
-    return state->level.rises ? rise(cfg, &state->derived.surface, &sense->sample) : brake(cfg, state);
+    return state->level.rises ? rise(&state->derived.surface, &sense->sample) : brake(cfg, state);
 }
 
 bool ivl_level_out_rests(const ivl_state_t *state)

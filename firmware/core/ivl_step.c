@@ -18,9 +18,9 @@ void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state)
             .dt_s = 1.0f / cfg->tick_hz,
             .tan_tilt_cmd_max = ivl_tan(cfg->tilt_cmd_rad_max),
             .cos_tilt_abort = ivl_sincos(cfg->tilt_abort_rad).cos,
-            .surface = ivl_surface_of(cfg),
             .cfg_good = true,
         };
+        ivl_surface_init(cfg, &state->derived.surface);
     }
 }
 
@@ -139,7 +139,7 @@ static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in,
     const float dt_s = state->derived.dt_s;
     state->guard.vitals = in->vitals;
     ivl_sense_update(cfg, &state->sense, in, dt_s);
-    state->sense.rel = ivl_surface_see(cfg, &state->derived.surface, &state->sense.sample);
+    ivl_surface_see(cfg, &state->derived.surface, &state->sense.sample, &state->sense.rel);
     count_faults(&state->diag, &state->sense);
     ivl_contact_update(cfg, &state->contact, &state->sense, dt_s);
     if (!ivl_motors_latched_off(state))

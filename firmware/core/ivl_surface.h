@@ -13,8 +13,9 @@ typedef struct
     float sin;         ///< n = (sin, 0, cos), t = (cos, 0, -sin)
     float cos;
     float up_z_cut;    ///< cosine of half of the turn that a landing needs: there the motors are cut
-    float late_s;      ///< a vehicle begins to brake so much later than a falling thrust tells: it has to tilt, or to push
     float brake_mps2;  ///< acceleration away from the surface that a level-out has
+    float late_s;      ///< it begins so much later: a vehicle before a tilted surface has to tilt first
+    float aside;       ///< a descent after an abort goes so far along x for each metre, not to come down on a steep slope
 } ivl_surface_t;
 
 /// One sensed state, relative to the plane.  For a ceiling: z, v_z, v_x, b_z . z, v'_z, and what hangs upside down.
@@ -29,20 +30,14 @@ typedef struct
 } ivl_relative_t;
 
 /// @param[in] cfg  a configuration that ivl_cfg_check accepts
-ivl_surface_t ivl_surface_of(const ivl_cfg_t *cfg);
+void ivl_surface_init(const ivl_cfg_t *cfg, ivl_surface_t *surface);
 
 /// @param[in] sample  quaternion of unit length
-ivl_relative_t ivl_surface_see(const ivl_cfg_t *cfg, const ivl_surface_t *surface, const ivl_sample_t *sample);
+void ivl_surface_see(const ivl_cfg_t *cfg, const ivl_surface_t *surface, const ivl_sample_t *sample, ivl_relative_t *rel);
 
 /// W vector of a speed along the plane and one away from it; y is kept.
-static inline ivl_vec3_t ivl_surface_vec3(const ivl_surface_t *surface, float along, float y, float away)
-{
-    return (ivl_vec3_t){surface->cos * along - surface->sin * away, y, 0.0f - surface->sin * along - surface->cos * away};
-}
+ivl_vec3_t ivl_surface_vec3(const ivl_surface_t *surface, float along, float y, float away);
 
-/// Height of a point.
-static inline float ivl_surface_height(const ivl_surface_t *surface, ivl_vec3_t p_W_m)
-{
-    return surface->sin * p_W_m.x + surface->cos * p_W_m.z;
-}
+/// Height of a point; of a velocity its part towards the surface.
+float ivl_surface_height(const ivl_surface_t *surface, ivl_vec3_t p_W_m);
 #endif  // IVL_SURFACE_H

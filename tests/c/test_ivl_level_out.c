@@ -8,7 +8,8 @@ static fix_t fix;
 
 static float rise_m(float v_close_mps, float thrust_mps2)
 {
-    const ivl_surface_t surface = ivl_surface_of(&fix.cfg);
+    ivl_surface_t surface;
+    ivl_surface_init(&fix.cfg, &surface);
     return ivl_level_out_rise_m(&fix.cfg, &surface, v_close_mps, thrust_mps2);
 }
 

@@ -64,8 +64,9 @@ static inline ivl_quat_t rng_quat(rng_t *rng)
 /// What the surface stage makes of the sample.
 static inline void see(const ivl_cfg_t *cfg, ivl_sense_t *sense)
 {
-    const ivl_surface_t surface = ivl_surface_of(cfg);
-    sense->rel = ivl_surface_see(cfg, &surface, &sense->sample);
+    ivl_surface_t surface;
+    ivl_surface_init(cfg, &surface);
+    ivl_surface_see(cfg, &surface, &sense->sample, &sense->rel);
 }
 
 // ---- a core with its four structs

@@ -60,11 +60,13 @@ static void test_a_ceiling_is_seen_along_the_axes_of_the_world_to_the_last_bit(v
 {
     rng_t rng = {1};
     fix_init(&fix);
-    const ivl_surface_t ceiling = ivl_surface_of(&fix.cfg);
+    ivl_surface_t ceiling;
+    ivl_surface_init(&fix.cfg, &ceiling);
     for (int i = 0; i < 1000; i++)
     {
         const ivl_sample_t   sample = any_sample(&rng);
-        const ivl_relative_t rel = ivl_surface_see(&fix.cfg, &ceiling, &sample);
+        ivl_relative_t     rel;
+        ivl_surface_see(&fix.cfg, &ceiling, &sample, &rel);
         TEST_ASSERT_EQUAL_FLOAT(sample.p_WB_m.z, rel.height_m);
         TEST_ASSERT_EQUAL_FLOAT(sample.v_WB_mps.z, rel.close_mps);
         TEST_ASSERT_EQUAL_FLOAT(sample.v_WB_mps.x, rel.along_mps);
@@ -81,12 +83,14 @@ static void test_a_tilted_surface_is_the_ceiling_turned(void)
     rng_t rng = {2};
     fix_init(&fix);
     fix.cfg.gravity_mps2 = 1.0f;
-    const ivl_surface_t ceiling = ivl_surface_of(&fix.cfg);
+    ivl_surface_t ceiling;
+    ivl_surface_init(&fix.cfg, &ceiling);
     for (int i = 0; i < 1000; i++)
     {
         const ivl_sample_t here = any_sample(&rng);
         fix.cfg.surface_tilt_rad = rng_float(&rng, 0.0f, FLOOR);
-        const ivl_surface_t surface = ivl_surface_of(&fix.cfg);
+        ivl_surface_t surface;
+        ivl_surface_init(&fix.cfg, &surface);
         const ivl_sincos_t  half = ivl_sincos(0.5f * fix.cfg.surface_tilt_rad);
         const ivl_quat_t    q = here.q_WB;
         ivl_sample_t        there = here;
@@ -95,7 +99,9 @@ static void test_a_tilted_surface_is_the_ceiling_turned(void)
         // about y by the tilt, then as before
         there.q_WB = (ivl_quat_t){half.cos * q.x + half.sin * q.z, half.cos * q.y + half.sin * q.w, half.cos * q.z - half.sin * q.x,
                                   half.cos * q.w - half.sin * q.y};
-        const ivl_relative_t a = ivl_surface_see(&fix.cfg, &ceiling, &here), b = ivl_surface_see(&fix.cfg, &surface, &there);
+        ivl_relative_t a, b;
+        ivl_surface_see(&fix.cfg, &ceiling, &here, &a);
+        ivl_surface_see(&fix.cfg, &surface, &there, &b);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, a.height_m, b.height_m);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, a.close_mps, b.close_mps);
         TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, a.along_mps, b.along_mps);
