@@ -65,13 +65,6 @@ void ivl_level_out_ask(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_seen_
     decision->asked = (v_mps > 0.0f) && is_open && (state->action.flip || is_last);
 }
 
-// the fence's side that is farthest from the surface, as a height
-static float farthest_m(const ivl_cfg_t *cfg, const ivl_surface_t *surface)
-{
-    const float z_m = (surface->cos < 0.0f) ? cfg->fence_z_m_max : cfg->fence_z_m_min;
-    return ivl_surface_height(surface, (ivl_vec3_t){cfg->fence_x_m_min, 0.0f, z_m});
-}
-
 // the highest point: from here along the surface with what speed there is, until it is braked away
 static void turn(const ivl_cfg_t *cfg, ivl_state_t *state)
 {
@@ -82,7 +75,9 @@ static void turn(const ivl_cfg_t *cfg, ivl_state_t *state)
     level->vy_mps = sense->sample.v_WB_mps.y;
     state->p_hold_W_m = sense->sample.p_WB_m;
     // where there is not room for both, in the middle between highest point and fence
-    const float far_m = farthest_m(cfg, &state->derived.surface);
+    const ivl_surface_t *surface = &state->derived.surface;
+    const float          z_m = (surface->cos < 0.0f) ? cfg->fence_z_m_max : cfg->fence_z_m_min;
+    const float          far_m = surface->sin * cfg->fence_x_m_min + surface->cos * z_m;
     const float h_m = sense->rel.height_m, half_m = 0.5f * (h_m - far_m), off_m = (half_m < DROP_M) ? half_m : DROP_M;
     level->h_m = ivl_clamp(level->h_m, far_m + off_m, h_m - off_m);
 }
@@ -100,7 +95,8 @@ static ivl_reference_t rise(const ivl_surface_t *surface, const ivl_sample_t *sa
 
 static bool retreats(const ivl_state_t *state)
 {
-    return ivl_surface_height(&state->derived.surface, state->p_hold_W_m) > state->level.h_m;
+    const ivl_surface_t *surface = &state->derived.surface;
+    return surface->sin * state->p_hold_W_m.x + surface->cos * state->p_hold_W_m.z > state->level.h_m;
 }
 
 // along the surface the speed falls by a constant acceleration, its direction stays

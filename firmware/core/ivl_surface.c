@@ -16,14 +16,10 @@ void ivl_surface_init(const ivl_cfg_t *cfg, ivl_surface_t *surface)
     if (cfg->surface_tilt_rad > 0.0f)
     {
         surface->brake_mps2 = cfg->approach_accel_mps2;
-        surface->late_s = (cfg->kp_att_xy_Nmprad > 0.0f) ? cfg->kd_rate_xy_Nmsprad / cfg->kp_att_xy_Nmprad : 0.0f;
-        surface->aside = (tilt.sin > -tilt.cos) ? ivl_clamp(tilt.cos / tilt.sin, -1.0f, 0.0f) : 0.0f;
+        // without a gain it never tilts: then an approach is decided about at once
+        surface->late_s = cfg->kd_rate_xy_Nmsprad / cfg->kp_att_xy_Nmprad;
+        surface->aside = ((tilt.cos < 0.0f) && (tilt.sin > -tilt.cos)) ? tilt.cos / tilt.sin : 0.0f;
     }
-}
-
-float ivl_surface_height(const ivl_surface_t *surface, ivl_vec3_t p_W_m)
-{
-    return surface->sin * p_W_m.x + surface->cos * p_W_m.z;
 }
 
 ivl_vec3_t ivl_surface_vec3(const ivl_surface_t *surface, float along, float y, float away)

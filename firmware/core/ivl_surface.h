@@ -37,7 +37,4 @@ void ivl_surface_see(const ivl_cfg_t *cfg, const ivl_surface_t *surface, const i
 
 /// W vector of a speed along the plane and one away from it; y is kept.
 ivl_vec3_t ivl_surface_vec3(const ivl_surface_t *surface, float along, float y, float away);
-
-/// Height of a point; of a velocity its part towards the surface.
-float ivl_surface_height(const ivl_surface_t *surface, ivl_vec3_t p_W_m);
 #endif  // IVL_SURFACE_H
