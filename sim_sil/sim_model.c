@@ -209,7 +209,8 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
     model->raw = *raw;
     model->firmware = *firmware;
     model->core = ivl_sim_core_linked;
-    model->surface = ivl_sim_surface_tilted(raw->world_ceiling_height_m, tilt_rad(raw), raw->surface_speed_along_mps, raw->surface_speed_away_mps);
+    model->surface =
+        ivl_sim_surface_tilted(raw->world_ceiling_height_m, tilt_rad(raw), raw->surface_speed_along_mps, raw->surface_speed_away_mps);
     model->up_W = ivl_d3(0.0, 0.0, 1.0);
     derive_legs(model);
     derive_plate(&model->plate[IVL_SIM_PROP_PLATE], raw->prop_plate_size_x_m, raw->prop_plate_size_y_m, raw->prop_plate_size_z_m,

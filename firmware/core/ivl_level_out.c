@@ -78,7 +78,7 @@ static void turn(const ivl_cfg_t *cfg, ivl_state_t *state)
     const ivl_surface_t *surface = &state->derived.surface;
     const float          z_m = (surface->cos < 0.0f) ? cfg->fence_z_m_max : cfg->fence_z_m_min;
     const float          far_m = surface->sin * cfg->fence_x_m_min + surface->cos * z_m;
-    const float h_m = sense->rel.height_m, half_m = 0.5f * (h_m - far_m), off_m = (half_m < DROP_M) ? half_m : DROP_M;
+    const float          h_m = sense->rel.height_m, half_m = 0.5f * (h_m - far_m), off_m = (half_m < DROP_M) ? half_m : DROP_M;
     level->h_m = ivl_clamp(level->h_m, far_m + off_m, h_m - off_m);
 }
 
@@ -114,8 +114,7 @@ static ivl_reference_t brake(const ivl_cfg_t *cfg, ivl_state_t *state)
         .a_W_mps2 = ivl_surface_vec3(surface, -lost * along * cfg->tick_hz, -lost * vy * cfg->tick_hz, 0.0f),
     };
     const float mean = 1.0f - 0.5f * lost;
-    state->p_hold_W_m =
-        ivl_add(state->p_hold_W_m, ivl_surface_vec3(surface, mean * along * dt_s, mean * vy * dt_s, back_mps * dt_s));
+    state->p_hold_W_m = ivl_add(state->p_hold_W_m, ivl_surface_vec3(surface, mean * along * dt_s, mean * vy * dt_s, back_mps * dt_s));
     level->along_mps = along - lost * along;
     level->vy_mps = vy - lost * vy;
     level->rest_s += ivl_level_out_rests(state) ? dt_s : 0.0f;

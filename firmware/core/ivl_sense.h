@@ -30,17 +30,17 @@ typedef struct
 
 typedef struct
 {
-    ivl_sample_t  sample;       ///< the last good sensed state, its quaternion normalised
-    ivl_command_t cmd;          ///< the last good command
-    float         age_s;        ///< age of the sample's position; grows by one tick per tick without a good one
-    float         up_z;         ///< z component in W of b_z: cosine of the tilt
-    ivl_relative_t rel;         ///< the sample, as seen from the surface (ivl_surface.h)
-    uint64_t      t_last_us;    ///< clock of the previous tick
-    float         cmd_age_s;    ///< time since the last good command
-    bool          pose_fresh;   ///< the sample is this tick's
-    bool          pose_usable;  ///< the sample is not older than stale_s_max
-    bool          cmd_fresh;    ///< the command is this tick's
-    bool          cmd_usable;   ///< the command is not older than stale_s_max
+    ivl_sample_t   sample;       ///< the last good sensed state, its quaternion normalised
+    ivl_command_t  cmd;          ///< the last good command
+    float          age_s;        ///< age of the sample's position; grows by one tick per tick without a good one
+    float          up_z;         ///< z component in W of b_z: cosine of the tilt
+    ivl_relative_t rel;          ///< the sample, as seen from the surface (ivl_surface.h)
+    uint64_t       t_last_us;    ///< clock of the previous tick
+    float          cmd_age_s;    ///< time since the last good command
+    bool           pose_fresh;   ///< the sample is this tick's
+    bool           pose_usable;  ///< the sample is not older than stale_s_max
+    bool           cmd_fresh;    ///< the command is this tick's
+    bool           cmd_usable;   ///< the command is not older than stale_s_max
 } ivl_sense_t;
 
 /// No sample, request IDLE.

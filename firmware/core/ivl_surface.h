@@ -10,7 +10,7 @@
 /// What follows from the configuration.
 typedef struct
 {
-    float sin;         ///< n = (sin, 0, cos), t = (cos, 0, -sin)
+    float sin;  ///< n = (sin, 0, cos), t = (cos, 0, -sin)
     float cos;
     float up_z_cut;    ///< cosine of half of the turn that a landing needs: there the motors are cut
     float brake_mps2;  ///< acceleration away from the surface that a level-out has

@@ -27,15 +27,14 @@ typedef struct
 {
     double speed_mps, angle_rad;  ///< of a surface at rest those of the specification
     double sine, cosine;
-    double flees_mps;             ///< speed of the surface along its normal
+    double flees_mps;  ///< speed of the surface along its normal
 } approach_t;
 
 static approach_t approach_of(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec)
 {
     const ivl_sim_params_t *raw = &model->raw;
-    approach_t              a = {.speed_mps = spec->speed_mps[0],
-                                 .angle_rad = spec->angle_deg[0] * (IVL_SIM_PI / 180.0),
-                                 .flees_mps = raw->surface_speed_away_mps};
+    approach_t              a = {
+        .speed_mps = spec->speed_mps[0], .angle_rad = spec->angle_deg[0] * (IVL_SIM_PI / 180.0), .flees_mps = raw->surface_speed_away_mps};
     ivl_sim_sincos(a.angle_rad, &a.sine, &a.cosine);
     if (fabs(raw->surface_speed_along_mps) + fabs(raw->surface_speed_away_mps) > 0.0)
     {

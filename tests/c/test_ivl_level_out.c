@@ -108,8 +108,8 @@ static void test_the_speed_along_the_ceiling_is_braked_in_its_own_direction(void
 
 static float room_needed_m(float v_mps)
 {
-    return rise_m(v_mps, fix.cfg.gravity_mps2) + v_mps / fix.cfg.tick_hz + fix.cfg.d_touch_m +
-           fix.cfg.level_margin_m + 2.0f * fix.cfg.height_sigma_m;
+    return rise_m(v_mps, fix.cfg.gravity_mps2) + v_mps / fix.cfg.tick_hz + fix.cfg.d_touch_m + fix.cfg.level_margin_m +
+           2.0f * fix.cfg.height_sigma_m;
 }
 
 /// A threshold that is never reached before: the last moment decides, at the distance that the rise needs.

@@ -64,7 +64,7 @@ static void test_a_ceiling_is_seen_along_the_axes_of_the_world_to_the_last_bit(v
     ivl_surface_init(&fix.cfg, &ceiling);
     for (int i = 0; i < 1000; i++)
     {
-        const ivl_sample_t   sample = any_sample(&rng);
+        const ivl_sample_t sample = any_sample(&rng);
         ivl_relative_t     rel;
         ivl_surface_see(&fix.cfg, &ceiling, &sample, &rel);
         TEST_ASSERT_EQUAL_FLOAT(sample.p_WB_m.z, rel.height_m);
@@ -91,9 +91,9 @@ static void test_a_tilted_surface_is_the_ceiling_turned(void)
         fix.cfg.surface_tilt_rad = rng_float(&rng, 0.0f, FLOOR);
         ivl_surface_t surface;
         ivl_surface_init(&fix.cfg, &surface);
-        const ivl_sincos_t  half = ivl_sincos(0.5f * fix.cfg.surface_tilt_rad);
-        const ivl_quat_t    q = here.q_WB;
-        ivl_sample_t        there = here;
+        const ivl_sincos_t half = ivl_sincos(0.5f * fix.cfg.surface_tilt_rad);
+        const ivl_quat_t   q = here.q_WB;
+        ivl_sample_t       there = here;
         there.p_WB_m = ivl_surface_vec3(&surface, here.p_WB_m.x, here.p_WB_m.y, -here.p_WB_m.z);
         there.v_WB_mps = ivl_surface_vec3(&surface, here.v_WB_mps.x, here.v_WB_mps.y, -here.v_WB_mps.z);
         // about y by the tilt, then as before
@@ -227,7 +227,8 @@ static void test_a_go_is_asked_where_a_level_out_still_keeps_off_the_wall(void)
     }
     // to tilt takes K_w / K_R, then it brakes like an approach accelerates
     const float tilts_s = fix.cfg.kd_rate_xy_Nmsprad / fix.cfg.kp_att_xy_Nmprad;
-    const float needed_m = v_mps * tilts_s + 0.5f * v_mps * v_mps / fix.cfg.approach_accel_mps2 + fix.cfg.d_touch_m + fix.cfg.level_margin_m;
+    const float needed_m =
+        v_mps * tilts_s + 0.5f * v_mps * v_mps / fix.cfg.approach_accel_mps2 + fix.cfg.d_touch_m + fix.cfg.level_margin_m;
     TEST_ASSERT_FLOAT_WITHIN(0.02f, 2.0f - needed_m, fix.in.p_WB_m.x);
 }
 

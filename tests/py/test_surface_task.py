@@ -14,7 +14,13 @@ from ivl.task import Task
 
 PLACE = ["rollout", "--speed", "2.5", "--angle", "60", "--rrev", "5", "--moment", "2", "--gear-set", "as_simulated"]
 TASK = {"vehicle": "habas2021", "gear": "wide_short", "speed_mps": 2.5, "angle_deg": 60.0}
-SEEN = {"rrev.rate": 100.0, "flow.rate": 100.0, "firmware.d_source": 2.0, "firmware.of_source": 1.0, "firmware.kf_v_sigma": 1.0}
+SEEN = {
+    "rrev.rate": 100.0,
+    "flow.rate": 100.0,
+    "firmware.d_source": 2.0,
+    "firmware.of_source": 1.0,
+    "firmware.kf_v_sigma": 1.0,
+}
 
 
 @pytest.mark.parametrize(("angle", "normal"), [(180, (0, 0, 1)), (135, (1, 0, 1)), (90, (1, 0, 0)), (0, (0, 0, -1))])
