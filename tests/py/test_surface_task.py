@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pytest import CaptureFixture
+
 
 import ivl
 from ivl import cli
@@ -37,7 +37,7 @@ def test_a_ceiling_is_what_is_flown_without_a_word() -> None:
     assert Task(**TASK, surface=180).make_world().params == Task(**TASK).make_world().params
 
 
-def test_option_and_setting_say_the_same(capsys: CaptureFixture[str], tmp_path: Path) -> None:
+def test_option_and_setting_say_the_same(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     found = []
     plot = tmp_path / "wall.png"
     for words in (["--surface", "90", "--plot", str(plot)], ["--set", "surface.angle_deg=90"]):
@@ -59,7 +59,7 @@ def test_option_and_setting_say_the_same(capsys: CaptureFixture[str], tmp_path: 
         (["--set", "surface.away_mps=0.5"], "firmware.d_source 0 does not see a surface move"),
     ],
 )
-def test_what_cannot_be_is_refused(capsys: CaptureFixture[str], words: list[str], complaint: str) -> None:
+def test_what_cannot_be_is_refused(capsys: pytest.CaptureFixture[str], words: list[str], complaint: str) -> None:
     assert cli.run([*PLACE, *words]) != 0
     assert complaint in capsys.readouterr().err.replace("\n", " ")
 
@@ -73,7 +73,7 @@ def test_left_is_right_in_a_mirror(angle: float) -> None:
     left, right = (
         world.rollouts(
             2.5, 60.0, 0.0, np.linspace(1.0, 8.0, 15), start="state", seed=4, stream=0,
-            state=ivl.State(p_W_m=point, v_W_mps=velocity + [0.0, side, 0.0]),
+            state=ivl.State(p_W_m=point, v_W_mps=velocity + np.array([0.0, side, 0.0])),
         )
         for side in (0.4, -0.4)
     )  # fmt: skip
