@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-
 import ivl
 from ivl import cli
 from ivl.errors import NativeError
