@@ -150,6 +150,33 @@ static double thrust_lag_s(const ivl_sim_model_t *model)
     return whole / 6.0 * sum / (hover * hover * (1.0 - kept));
 }
 
+/// Of the surface's normal, from up to x.
+static double tilt_rad(const ivl_sim_params_t *raw)
+{
+    return (180.0 - raw->surface_angle_deg) * (IVL_SIM_PI / 180.0);
+}
+
+/// A source that knows where the surface is, or takes the vehicle's own speed for the closing speed, is wrong of one that moves.
+static bool sees_motion(const ivl_sim_params_t *raw, const ivl_cfg_t *cfg, char *error, size_t error_size)
+{
+    const bool moves = fabs(raw->surface_speed_away_mps) + fabs(raw->surface_speed_along_mps) > 0.0;
+    const bool relative = cfg->d_source == (uint8_t)IVL_SOURCE_FILTER || cfg->d_source == (uint8_t)IVL_SOURCE_FORMULA;
+    if (moves && !relative)
+    {
+        snprintf(error, error_size,
+                 "surface.speed_along, surface.speed_away: %g and %g m/s: firmware.d_source %d does not see a surface move (1 and 2 do)",
+                 raw->surface_speed_along_mps, raw->surface_speed_away_mps, (int)cfg->d_source);
+        return false;
+    }
+    if (fabs(raw->surface_speed_along_mps) > 0.0 && cfg->of_source == 0u)
+    {
+        snprintf(error, error_size, "surface.speed_along: %g m/s: firmware.of_source 0 does not see it (1 does, with a flow sensor)",
+                 raw->surface_speed_along_mps);
+        return false;
+    }
+    return true;
+}
+
 /// The flight core knows the vehicle that it flies: its copy of these numbers follows from the world's.
 static void tell_firmware(ivl_sim_model_t *model)
 {
@@ -168,7 +195,8 @@ static void tell_firmware(ivl_sim_model_t *model)
     // 0 tells that the supply never sags
     cfg->vbat_V_rated = (raw->battery_voltage_V > 0.0) ? (float)raw->battery_rated_voltage_V : 0.0f;
     cfg->d_touch_m = (float)(top_m(model) + raw->world_sensed_gap_offset_m);
-    cfg->h_ceil_m = (float)(raw->world_ceiling_height_m + raw->world_sensed_gap_offset_m);
+    cfg->h_ceil_m = (float)(ivl_sim_surface_height(&model->surface, 0.0) + raw->world_sensed_gap_offset_m);
+    cfg->surface_tilt_rad = (float)tilt_rad(raw);
 }
 
 bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, const ivl_cfg_t *firmware, char *error, size_t error_size)
@@ -181,7 +209,8 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
     model->raw = *raw;
     model->firmware = *firmware;
     model->core = ivl_sim_core_linked;
-    model->surface = ivl_sim_surface_level(raw->world_ceiling_height_m);
+    model->surface =
+        ivl_sim_surface_tilted(raw->world_ceiling_height_m, tilt_rad(raw), raw->surface_speed_along_mps, raw->surface_speed_away_mps);
     model->up_W = ivl_d3(0.0, 0.0, 1.0);
     derive_legs(model);
     derive_plate(&model->plate[IVL_SIM_PROP_PLATE], raw->prop_plate_size_x_m, raw->prop_plate_size_y_m, raw->prop_plate_size_z_m,
@@ -205,6 +234,10 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
         const char *name = ivl_cfg_bad_name(&model->firmware);
         snprintf(error, error_size, "firmware.%s: refused by the flight core: out of range, or at odds with the vehicle",
                  name ? name : "?");
+        return false;
+    }
+    if (!sees_motion(raw, &model->firmware, error, error_size))
+    {
         return false;
     }
     if (raw->rotor_drag_share_norm > 0.0 && raw->rotor_tau_down_s < SLOW_TAU_S)

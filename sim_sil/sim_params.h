@@ -15,8 +15,11 @@
 // clang-format off
 #define IVL_SIM_PARAMS(X) \
     X(world, gravity, mps2, "m/s^2", 0.0, 30.0, 9.81, "acceleration of gravity") \
-    X(world, ceiling_height, m, "m", 0.5, 20.0, 3.0, "height of the ceiling's surface") \
+    X(world, ceiling_height, m, "m", 0.5, 20.0, 3.0, "height of the surface, of one that is no ceiling at x = 0") \
     X(world, sensed_gap_offset, m, "m", -0.1, 0.1, 0.0, "height of the plane that the cues refer to, above the surface") \
+    X(surface, angle, deg, "deg", 0.0, 180.0, 180.0, "angle of the surface: 180 ceiling, 90 wall ahead, 0 floor; its normal is (sin, 0, -cos) of this") \
+    X(surface, speed_along, mps, "m/s", -5.0, 5.0, 0.0, "velocity of the surface forward along itself") \
+    X(surface, speed_away, mps, "m/s", -5.0, 5.0, 0.0, "velocity of the surface along its normal; below 0 it comes towards the vehicle") \
     X(body, mass, kg, "kg", 0.001, 10.0, IVL_SIM_REQUIRED, "airframe with battery, without legs; centre of mass at the body origin") \
     X(body, inertia_xx, kgm2, "kg m^2", 1.0e-7, 1.0, IVL_SIM_REQUIRED, "principal moment of inertia of the airframe about body x") \
     X(body, inertia_yy, kgm2, "kg m^2", 1.0e-7, 1.0, IVL_SIM_REQUIRED, "about body y") \

@@ -52,7 +52,7 @@ typedef struct
 
 /// Start a path at the present position with the present velocity component along it; a vehicle already at speed just holds it.
 /// Shape REGION starts with both components of the velocity.
-/// @param[in] angle_rad  above horizontal, 0..pi/2
+/// @param[in] angle_rad  above horizontal, -pi..pi; shape REGION: 0..pi/2
 void ivl_approach_begin(const ivl_cfg_t *cfg, ivl_approach_t *approach, ivl_vec3_t p_WB_m, ivl_vec3_t v_WB_mps, float speed_mps,
                         float angle_rad);
 

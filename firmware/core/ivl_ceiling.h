@@ -1,5 +1,5 @@
 /// @file ivl_ceiling.h
-/// Distance and closing speed of a ceiling of known height, d = h_ceil - z: one of the sources of stage 2 (ivl_distance.h).
+/// Distance and closing speed of a surface of known height, d = h_ceil - n.p (a ceiling: h_ceil - z): one of the sources of stage 2 (ivl_distance.h).
 #ifndef IVL_CEILING_H
 #define IVL_CEILING_H
 #include "ivl_sense.h"

@@ -86,6 +86,11 @@ static int bad_match(const ivl_cfg_t *cfg)
             return PAIRS[i].row;
         }
     }
+    // the region of the approach is one below a ceiling
+    if ((cfg->shape == 3u) && (cfg->surface_tilt_rad > 0.0f))
+    {
+        return ROW_surface_tilt_rad;
+    }
     if (!(4.0f * cfg->motor_thrust_N_max > cfg->mass_kg * cfg->gravity_mps2))
     {
         return ROW_motor_thrust_N_max;

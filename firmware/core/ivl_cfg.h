@@ -15,7 +15,7 @@ typedef struct
 void ivl_cfg_defaults(ivl_cfg_t *cfg);
 
 /// Check every range of IVL_PARAMS (NaN is refused), and that the members fit each other: d_ceil_min < d_ceil_max, speed_min < speed_max,
-/// the fence has an inside, four motors can lift the weight, the thrust curve is finite up to the largest thrust.
+/// the fence has an inside, four motors can lift the weight, the thrust curve is finite up to the largest thrust, shape REGION goes with a ceiling.
 /// @return IVL_OK or IVL_ERR_RANGE
 ivl_status_t ivl_cfg_check(const ivl_cfg_t *cfg);
 

@@ -7,7 +7,7 @@
 typedef struct
 {
     bool  contact;  ///< this tick: |f| >= contact_accel_mps2
-    bool  hanging;  ///< f_B.z <= -g/2 (hanging upside down) held for hang_s
+    bool  hanging;  ///< hung_mps2 >= g/2 (upside down on a ceiling, nose up on a wall) held for hang_s
     float hang_s;   ///< how long it has held so far
 } ivl_contact_t;
 

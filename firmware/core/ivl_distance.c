@@ -24,22 +24,13 @@ static const float RESTART_V_SIGMA_NORM = 10.0f;
 // a difference quotient over less time is noise
 static const float PERIOD_S_MIN = 0.001f;
 
-// acceleration towards the ceiling: the third row of the attitude's matrix, times the specific force, less gravity
-static float a_close(const ivl_cfg_t *cfg, const ivl_sense_t *sense)
-{
-    const ivl_quat_t q = sense->sample.q_WB;
-    const ivl_vec3_t f = sense->sample.f_B_mps2;
-    const float      up = 2.0f * ((q.x * q.z - q.w * q.y) * f.x + (q.y * q.z + q.w * q.x) * f.y) + sense->up_z * f.z;
-    return ivl_clamp(up - cfg->gravity_mps2, -A_MPS2_MAX, A_MPS2_MAX);
-}
-
 // readings from before stay looked at; the history's old ticks need no clearing
 static void start(const ivl_cfg_t *cfg, ivl_distance_t *distance, const ivl_sense_t *sense)
 {
     ivl_history_start(&distance->history);
     ivl_formula_start(&distance->formula);
-    const float d_m = cfg->h_ceil_m - sense->sample.p_WB_m.z, d_m_min = START_SIGMAS * cfg->kf_d_sigma_m;
-    ivl_filter_start(&distance->filter, (d_m > d_m_min) ? d_m : d_m_min, sense->sample.v_WB_mps.z, cfg->kf_d_sigma_m, cfg->kf_v_sigma_mps,
+    const float d_m = cfg->h_ceil_m - sense->rel.height_m, d_m_min = START_SIGMAS * cfg->kf_d_sigma_m;
+    ivl_filter_start(&distance->filter, (d_m > d_m_min) ? d_m : d_m_min, sense->rel.close_mps, cfg->kf_d_sigma_m, cfg->kf_v_sigma_mps,
                      cfg->kf_b_sigma_mps2);
     distance->motion = (ivl_motion_t){0.0f, 0.0f};
     distance->since_s = 0.0f;
@@ -142,12 +133,12 @@ static void filter_correct(const ivl_cfg_t *cfg, ivl_distance_t *distance, const
     }
 }
 
-static void filter_take(const ivl_cfg_t *cfg, ivl_distance_t *distance, measured_t what, const measurement_t *m, float up_z)
+static void filter_take(const ivl_cfg_t *cfg, ivl_distance_t *distance, measured_t what, const measurement_t *m, float facing)
 {
     ivl_filter_t      *filter = &distance->filter;
     const ivl_motion_t gain = gained(distance, m->motion, m->span_s);
     ivl_filter_predict(filter, m->span_s, gain.v_mps, gain.p_m, cfg->kf_q_m2ps3);
-    const ivl_innovation_t innovation = (what == MEASURED_RREV) ? of_rrev(cfg, filter, m->value) : of_range(cfg, filter, m->value * up_z);
+    const ivl_innovation_t innovation = (what == MEASURED_RREV) ? of_rrev(cfg, filter, m->value) : of_range(cfg, filter, m->value * facing);
     filter_correct(cfg, distance, &innovation);
 }
 
@@ -195,7 +186,7 @@ static void formula_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, i
 
 static void range_show(const ivl_cfg_t *cfg, const ivl_distance_t *distance, const ivl_sense_t *sense, ivl_ceiling_t *ceiling)
 {
-    const float v_mps = sense->sample.v_WB_mps.z;
+    const float v_mps = sense->rel.close_mps;
     const float drift_m = cfg->kf_v_sigma_mps * distance->since_s;
     ceiling->d_ceil_m = distance->range_d_m - v_mps * distance->since_s;
     ceiling->v_close_mps = v_mps;
@@ -216,7 +207,7 @@ static void take(const ivl_cfg_t *cfg, ivl_distance_t *distance, const ivl_sense
 {
     if (cfg->d_source == (uint8_t)IVL_SOURCE_FILTER)
     {
-        filter_take(cfg, distance, what, m, sense->up_z);
+        filter_take(cfg, distance, what, m, sense->rel.facing);
     }
     else if (cfg->d_source == (uint8_t)IVL_SOURCE_FORMULA)
     {
@@ -224,7 +215,7 @@ static void take(const ivl_cfg_t *cfg, ivl_distance_t *distance, const ivl_sense
     }
     else
     {
-        distance->range_d_m = m->value * sense->up_z;
+        distance->range_d_m = m->value * sense->rel.facing;
         distance->n_taken++;
     }
     distance->has_range = distance->has_range || (what == MEASURED_RANGE);
@@ -271,7 +262,7 @@ ivl_ceiling_t ivl_distance_update(const ivl_cfg_t *cfg, ivl_distance_t *distance
         start(cfg, distance, sense);
         return (ivl_ceiling_t){0};
     }
-    ivl_history_push(&distance->history, a_close(cfg, sense), dt_s);
+    ivl_history_push(&distance->history, ivl_clamp(sense->rel.accel_mps2, -A_MPS2_MAX, A_MPS2_MAX), dt_s);
     distance->since_s += dt_s;
     // a tick whose clock or state is bad looks at no measurement
     if (!sense->pose_fresh)

@@ -348,7 +348,8 @@ void ivl_guard_lock_out(const ivl_cfg_t *cfg, ivl_state_t *state)
     {
         guard->locked_out = false;
     }
-    if ((state->phase == IVL_PHASE_FLIP) || ((state->phase == IVL_PHASE_ABORTED) && state->abort_cut))
+    // a flip onto a floor is over in the tick in which it begins
+    if ((state->phase == IVL_PHASE_FLIP) || (state->phase == IVL_PHASE_COAST) || ((state->phase == IVL_PHASE_ABORTED) && state->abort_cut))
     {
         guard->locked_out = true;
     }

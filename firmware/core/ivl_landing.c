@@ -19,7 +19,9 @@ ivl_reference_t ivl_landing_next(const ivl_cfg_t *cfg, ivl_state_t *state)
     }
     if (hold->z > cfg->land_height_m)
     {
+        ref.v_W_mps.x = state->derived.surface.aside * cfg->land_speed_mps;
         ref.v_W_mps.z = -cfg->land_speed_mps;
+        hold->x += ref.v_W_mps.x * dt_s;
         hold->z -= cfg->land_speed_mps * dt_s;
     }
     else

@@ -1,5 +1,5 @@
 /// @file ivl_landing.h
-/// Stage 5d: after an abort, end a level-out, hover level, then descend straight down at land_speed to land_height.
+/// Stage 5d: after an abort, end a level-out, hover level, then descend straight down, or along a steep slope below, at land_speed to land_height.
 /// A vehicle that is aborted on its way to the ceiling is not steered before it has turned: a tilt could bring a rotor to the ceiling.
 #ifndef IVL_LANDING_H
 #define IVL_LANDING_H

@@ -1,16 +1,17 @@
 /// @file ivl_level_out.h
 /// Go / no-go: the last moment at which an approach can still be called off, and how the vehicle then keeps off the ceiling.
-/// The vehicle first rises, level, with the least thrust that the controller can hold it level with.  From the highest point on it brakes along
+/// Below a ceiling the vehicle first rises, level, with the least thrust that the controller can hold it level with; before what is ahead it tilts back,
+/// above what is below it pushes.  "Highest" is nearest to the surface: heights are along its normal.  From the highest point on it brakes along
 /// the ceiling, descends to the height at which the approach began, and hovers there.                             [MODEL section 14]
 #ifndef IVL_LEVEL_OUT_H
 #define IVL_LEVEL_OUT_H
 #include "ivl_state.h"
 
-/// How far the vehicle rises from the moment at which its thrust is reduced.
+/// How far the vehicle still comes towards the surface (rises, below a ceiling) from the moment at which it begins to brake.
 /// @param[in] v_close_mps   closing speed at that moment; 0 or less gives 0
 /// @param[in] thrust_mps2   acceleration that the rotors make at that moment, gravity included: g while the speed is held
 /// @return in m, >= 0
-float ivl_level_out_rise_m(const ivl_cfg_t *cfg, float v_close_mps, float thrust_mps2);
+float ivl_level_out_rise_m(const ivl_cfg_t *cfg, const ivl_surface_t *surface, float v_close_mps, float thrust_mps2);
 
 /// An approach begins here: nothing is decided, and a level-out would come back to this height.  Until a cue is valid for the first time, the
 /// ceiling is taken to be where h_ceil says.

@@ -84,7 +84,7 @@ CONDITION(triggered)
 CONDITION(inverted)
 {
     UNUSED(seen);
-    return (cfg->cut_at_inverted != 0u) && !(state->sense.up_z > 0.0f);
+    return (cfg->cut_at_inverted != 0u) && !(state->sense.up_z > state->derived.surface.up_z_cut);
 }
 
 CONDITION(attached_over)
@@ -170,7 +170,7 @@ static void enter_ready(ivl_state_t *state)
     memset(&state->action, 0, sizeof state->action);
     memset(&state->decision, 0, sizeof state->decision);
     // nothing to level out
-    state->level = (ivl_level_t){.z_W_m = IVL_SENSE_P_M_MAX};
+    state->level = (ivl_level_t){.h_m = 2.0f * IVL_SENSE_P_M_MAX};
 }
 
 static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, const ivl_seen_t *seen)
@@ -186,7 +186,9 @@ static void enter(const ivl_cfg_t *cfg, ivl_state_t *state, ivl_phase_t next, co
         break;
     case IVL_PHASE_APPROACH:
         ivl_level_out_prepare(state);
-        ivl_approach_begin(cfg, &state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps, state->sense.cmd.angle_rad);
+        // a surface that is tilted turns the path along with it
+        ivl_approach_begin(cfg, &state->approach, sample->p_WB_m, sample->v_WB_mps, state->sense.cmd.speed_mps,
+                           state->sense.cmd.angle_rad - cfg->surface_tilt_rad);
         break;
     case IVL_PHASE_FLIP:
         state->triggered = true;

@@ -29,7 +29,7 @@ bool ivl_sense_command_good(const ivl_cfg_t *cfg, const ivl_command_t *cmd)
         return ivl_vec3_within(cmd->p_hover_W_m, IVL_SENSE_P_M_MAX);
     case IVL_REQUEST_APPROACH:
         return (cmd->speed_mps >= cfg->speed_mps_min) && (cmd->speed_mps <= cfg->speed_mps_max) && (cmd->angle_rad >= 0.0f) &&
-               (cmd->angle_rad <= IVL_HALF_PI);
+               (cmd->angle_rad <= IVL_PI);
     case IVL_REQUEST_COUNT:
     default:
         return false;

@@ -2,7 +2,7 @@
 /// Stage 1: the sensed state and the command, checked.  Each is taken as a whole or not at all; the last good one is kept.
 #ifndef IVL_SENSE_H
 #define IVL_SENSE_H
-#include "ivl_cfg.h"
+#include "ivl_surface.h"
 
 // limits beyond which a value is called impossible; all are far outside what the vehicle can do
 #define IVL_SENSE_P_M_MAX     200.0f   ///< m, each coordinate
@@ -30,16 +30,17 @@ typedef struct
 
 typedef struct
 {
-    ivl_sample_t  sample;       ///< the last good sensed state, its quaternion normalised
-    ivl_command_t cmd;          ///< the last good command
-    float         age_s;        ///< age of the sample's position; grows by one tick per tick without a good one
-    float         up_z;         ///< z component in W of b_z: cosine of the tilt
-    uint64_t      t_last_us;    ///< clock of the previous tick
-    float         cmd_age_s;    ///< time since the last good command
-    bool          pose_fresh;   ///< the sample is this tick's
-    bool          pose_usable;  ///< the sample is not older than stale_s_max
-    bool          cmd_fresh;    ///< the command is this tick's
-    bool          cmd_usable;   ///< the command is not older than stale_s_max
+    ivl_sample_t   sample;       ///< the last good sensed state, its quaternion normalised
+    ivl_command_t  cmd;          ///< the last good command
+    float          age_s;        ///< age of the sample's position; grows by one tick per tick without a good one
+    float          up_z;         ///< z component in W of b_z: cosine of the tilt
+    ivl_relative_t rel;          ///< the sample, as seen from the surface (ivl_surface.h)
+    uint64_t       t_last_us;    ///< clock of the previous tick
+    float          cmd_age_s;    ///< time since the last good command
+    bool           pose_fresh;   ///< the sample is this tick's
+    bool           pose_usable;  ///< the sample is not older than stale_s_max
+    bool           cmd_fresh;    ///< the command is this tick's
+    bool           cmd_usable;   ///< the command is not older than stale_s_max
 } ivl_sense_t;
 
 /// No sample, request IDLE.

@@ -33,10 +33,11 @@ typedef struct
 /// Values that follow from the configuration, made once by ivl_init.
 typedef struct
 {
-    float dt_s;
-    float tan_tilt_cmd_max;
-    float cos_tilt_abort;
-    bool  cfg_good;  ///< false: ivl_cfg_check refused the configuration, the core stays in IDLE
+    float         dt_s;
+    float         tan_tilt_cmd_max;
+    float         cos_tilt_abort;
+    ivl_surface_t surface;
+    bool          cfg_good;  ///< false: ivl_cfg_check refused the configuration, the core stays in IDLE
 } ivl_derived_t;
 
 /// What was decided about this approach, go or no-go, and what it rests on.  The first five are zero before, but for `asked`.
@@ -55,11 +56,11 @@ typedef struct
 /// What LEVEL_OUT remembers; ABORTED goes on with it.
 typedef struct
 {
-    bool  rises;   ///< on the way up, from the begin of the approach on
-    float z_W_m;   ///< height at which to hover in the end
-    float rest_s;  ///< how long the reference has been at rest there
-    float vx_mps;  ///< velocity of the reference along the ceiling, once the vehicle rises no more
-    float vy_mps;
+    bool  rises;      ///< on the way up, from the begin of the approach on
+    float h_m;        ///< height along the surface's normal at which to hover in the end
+    float rest_s;     ///< how long the reference has been at rest there
+    float along_mps;  ///< velocity of the reference along the surface, once the vehicle comes no nearer: forward
+    float vy_mps;     ///< and to the left
 } ivl_level_t;
 
 typedef struct

@@ -20,6 +20,7 @@ void ivl_init(const ivl_cfg_t *cfg, ivl_state_t *state)
             .cos_tilt_abort = ivl_sincos(cfg->tilt_abort_rad).cos,
             .cfg_good = true,
         };
+        ivl_surface_init(cfg, &state->derived.surface);
     }
 }
 
@@ -138,6 +139,7 @@ static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in,
     const float dt_s = state->derived.dt_s;
     state->guard.vitals = in->vitals;
     ivl_sense_update(cfg, &state->sense, in, dt_s);
+    ivl_surface_see(cfg, &state->derived.surface, &state->sense.sample, &state->sense.rel);
     count_faults(&state->diag, &state->sense);
     ivl_contact_update(cfg, &state->contact, &state->sense, dt_s);
     if (!ivl_motors_latched_off(state))
@@ -145,7 +147,7 @@ static void decide(const ivl_cfg_t *cfg, ivl_state_t *state, const ivl_in_t *in,
         // an approach that ends with this tick's request needs no estimate any more
         const bool is_approach = (state->phase == IVL_PHASE_APPROACH) && (state->sense.cmd.request == IVL_REQUEST_APPROACH);
         seen->ceiling = ivl_distance_update(cfg, &state->distance, &state->sense, in, is_approach, dt_s);
-        seen->cues = ivl_cues_compute(seen->ceiling, state->sense.sample.v_WB_mps);
+        seen->cues = ivl_cues_compute(seen->ceiling, state->sense.rel.along_mps);
         ivl_cues_take_flow(cfg, in, &seen->cues);
     }
     ivl_phase_update(cfg, state, seen);

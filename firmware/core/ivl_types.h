@@ -59,7 +59,7 @@ typedef struct
     ivl_request_t request;
     ivl_vec3_t    p_hover_W_m;  ///< used by HOVER
     float         speed_mps;    ///< used by APPROACH, latched when the approach starts
-    float         angle_rad;    ///< used by APPROACH: angle above horizontal, 0..pi/2; motion in the x-z plane of W, along +x
+    float angle_rad;  ///< used by APPROACH: angle to the surface, 0..pi; below pi/2 forward along it (ivl_surface.h), in the x-z plane of W
 } ivl_command_t;
 
 /// Safety rules; the numbers are part of the log format.  What each one says stands in the table of ivl_guard.c.

@@ -23,7 +23,8 @@
     X(float, "ivl", "motor_lag", motor_lag_s, "s", 0.0, 0.5, 0.0, "constant with which the thrust falls")                                    \
     X(float, "ivl", "vbat_rated", vbat_V_rated, "V", 0.0, 30.0, 3.7, "battery below this gives less than motor_thrust_max; 0: it always gives that")\
     X(float, "ivl", "d_touch", d_touch_m, "m", -0.2, 0.5, 0.02, "distance of the plane at which a level vehicle touches the ceiling")        \
-    X(float, "ivl", "h_ceil", h_ceil_m, "m", -100.0, 100.0, 2.1, "height in W of the plane that the cues refer to")
+    X(float, "ivl", "h_ceil", h_ceil_m, "m", -100.0, 100.0, 2.1, "height of the plane that the cues refer to, along the surface's normal")   \
+    X(float, "ivl", "surface_tilt", surface_tilt_rad, "rad", 0.0, 3.1416, 0.0, "tilt of the surface's normal from up to W x: 0 ceiling, pi/2 wall ahead, pi floor")
 
 /// How it flies.
 #define IVL_FLIGHT_PARAMS(X)                                                                                                                 \
@@ -89,7 +90,7 @@
     X(float, "ivl", "flip_s_max", flip_s_max, "s", 0.01, 5.0, 1.0, "motors are cut this long after the trigger at the latest")               \
     X(float, "ivl", "coast_s_max", coast_s_max, "s", 0.1, 10.0, 2.5, "coast without contact ends after this")                                \
     X(float, "ivl", "attached_s", attached_s, "s", 0.0, 10.0, 1.0, "stay in attached before done")                                           \
-    X(uint8_t, "ivl", "cut_at_inverted", cut_at_inverted, "1", 0, 1, 1, "cut motors when b_z passes the horizontal")                         \
+    X(uint8_t, "ivl", "cut_at_inverted", cut_at_inverted, "1", 0, 1, 1, "cut motors half way round: at a ceiling when b_z passes the horizontal")                         \
     X(uint8_t, "ivl", "cut_on_contact", cut_on_contact, "1", 0, 1, 1, "cut motors at the first sensed contact")                              \
     X(float, "ivl", "contact_accel", contact_accel_mps2, "m/s^2", 12.0, 1000.0, 25.0, "specific force that means contact (a flip makes 10)") \
     X(float, "ivl", "hang_s", hang_s, "s", 0.02, 5.0, 0.2, "specific force reversed for this long means hanging")                            \

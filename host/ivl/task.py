@@ -34,6 +34,33 @@ def _estimator(name: str) -> str:
     return name
 
 
+class SurfaceChoice(Strict):
+    """The plane that is landed on. Its normal (sin, 0, -cos) of the angle points into it, in the world."""
+
+    angle_deg: Finite = Field(
+        default=180.0, ge=0.0, le=180.0, description="Angle, degrees: 180 is a ceiling, 90 a wall ahead, 0 a floor."
+    )
+    along_mps: Finite = Field(
+        default=0.0, ge=-5.0, le=5.0, description="Velocity of the surface forward along itself, m/s."
+    )
+    away_mps: Finite = Field(
+        default=0.0, ge=-5.0, le=5.0, description="Velocity of the surface along its normal, m/s; below 0 it comes."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _an_angle_alone(cls, data: Any) -> Any:
+        """An angle may stand for the whole: of a surface at rest."""
+        is_number = isinstance(data, (int, float)) and not isinstance(data, bool)
+        return {"angle_deg": float(data)} if is_number else data
+
+    def world_settings(self) -> dict[str, float]:
+        """World parameters that differ from those of a ceiling at rest."""
+        default = SurfaceChoice()
+        names = {"angle_deg": "surface.angle", "along_mps": "surface.speed_along", "away_mps": "surface.speed_away"}
+        return {name: getattr(self, own) for own, name in names.items() if getattr(self, own) != getattr(default, own)}
+
+
 class Setup(Strict):
     """The part of a task that is no place in a grid: all but landing gear and approach velocity."""
 
@@ -53,6 +80,9 @@ class Setup(Strict):
     start: Literal["imparted", "flown", "at_trigger"] = Field(
         default="imparted", description="At the approach velocity, from hover, or at the trigger."
     )
+    surface: SurfaceChoice = Field(
+        default=SurfaceChoice(), description="Surface to land on by its angle: 180 ceiling, 90 wall, 0 floor."
+    )
     overrides: dict[str, Setting] = Field(default_factory=dict, description="Parameters of the world that differ.")
     family: FamilyChoice = Field(
         default=FamilyChoice(), description="What is uncertain of all that, beside the sigma of the files."
@@ -60,12 +90,16 @@ class Setup(Strict):
 
     @model_validator(mode="after")
     def _one_word_for_each(self) -> Self:
-        """Refuse an override of what approach or estimator say otherwise: one of them would do nothing."""
+        """Refuse an override of what approach, estimator or surface say otherwise: one of them would do nothing."""
         said = {} if self.approach == APPROACHES[0] else approach_settings(self.approach)
-        for name, value in {**said, **estimator_settings(self.estimator)}.items():
+        by_field = {
+            "approach": said,
+            "estimator": estimator_settings(self.estimator),
+            "surface": self.surface.world_settings(),
+        }
+        for field, name, value in [(field, *item) for field, said in by_field.items() for item in said.items()]:
             override = self.overrides.get(name)
             if override is not None and override.value != value:
-                field = "estimator" if name in estimator_settings(self.estimator) else "approach"
                 said_by = f"{field} {getattr(self, field)!r}"
                 raise ValueError(f"overrides.{name}: {override.value:g} contradicts {said_by}, which says {value:g}")
         return self
@@ -81,7 +115,8 @@ class Setup(Strict):
     def world_settings(self) -> dict[str, float]:
         """World parameters that differ from what vehicle, gear and sensor set say."""
         overrides = {name: setting.value for name, setting in self.overrides.items()}
-        return {**approach_settings(self.approach), **estimator_settings(self.estimator), **overrides}
+        said = {**approach_settings(self.approach), **estimator_settings(self.estimator)}
+        return {**said, **self.surface.world_settings(), **overrides}
 
     def world_of(self, gear: str) -> World:
         """The world of this set-up with one landing gear; that of a member if the family names one."""
@@ -101,7 +136,7 @@ class Task(Setup):
 
     gear: str = Field(description="Landing gear; see `ivl list gears`.")
     speed_mps: Finite = Field(description="Approach speed, m/s.")
-    angle_deg: Finite = Field(description="Approach angle above the horizontal, degrees.")
+    angle_deg: Finite = Field(description="Approach angle to the surface, degrees: of a ceiling above the horizontal.")
 
     @model_validator(mode="after")
     def _in_range(self) -> Self:

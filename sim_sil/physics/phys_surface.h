@@ -15,10 +15,15 @@ typedef struct
     ivl_d3_t velocity_W_mps;
 } ivl_sim_surface_t;
 
+/// A plane through (0, 0, height) whose normal is tilted from up towards x: a ceiling without, a wall ahead at a right angle.
+/// @param[in] along_mps, away_mps  its velocity, forward and along the normal
+ivl_sim_surface_t ivl_sim_surface_tilted(double height_m, double tilt_rad, double along_mps, double away_mps);
+
 /// A ceiling at rest.
 ivl_sim_surface_t ivl_sim_surface_level(double height_m);
 
-/// Unit vector along the surface that is forward: the world's x axis, turned the shortest way from z up to the normal.
+/// Unit vector along the surface that is forward: the world's x axis, turned the shortest way from z up to the normal; for a floor
+/// that is about y.
 ivl_d3_t ivl_sim_surface_forward(const ivl_sim_surface_t *surface);
 
 /// Height of a point.

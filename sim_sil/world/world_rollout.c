@@ -22,38 +22,62 @@ const char *ivl_sim_end_name(int end)
     return (end >= 0 && end < IVL_SIM_END_COUNT) ? END_NAMES[end] : "?";
 }
 
-/// Distance from the plane of the cues at which a level rollout starts.                          [MODEL eq. 6.1, 6.2]
-static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, double sin_angle)
+/// The approach in the world, where the vehicle flies it: the velocity that the specification gives is as seen from the surface.
+typedef struct
 {
-    const double speed = spec->speed_mps[0];
-    const double path = 0.5 * speed * speed / (double)model->firmware.approach_accel_mps2 + speed * model->raw.start_hold_time_s;
+    double speed_mps, angle_rad;  ///< of a surface at rest those of the specification
+    double sine, cosine;
+    double flees_mps;  ///< speed of the surface along its normal
+} approach_t;
+
+static approach_t approach_of(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec)
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    approach_t              a = {
+        .speed_mps = spec->speed_mps[0], .angle_rad = spec->angle_deg[0] * (IVL_SIM_PI / 180.0), .flees_mps = raw->surface_speed_away_mps};
+    ivl_sim_sincos(a.angle_rad, &a.sine, &a.cosine);
+    if (fabs(raw->surface_speed_along_mps) + fabs(raw->surface_speed_away_mps) > 0.0)
+    {
+        const double along = a.speed_mps * a.cosine + raw->surface_speed_along_mps, rising = a.speed_mps * a.sine + a.flees_mps;
+        a.speed_mps = sqrt(along * along + rising * rising);
+        a.angle_rad = ivl_sim_atan2(rising, along);
+        a.sine = (a.speed_mps > 0.0) ? rising / a.speed_mps : 1.0;
+        a.cosine = (a.speed_mps > 0.0) ? along / a.speed_mps : 0.0;
+    }
+    return a;
+}
+
+/// Distance from the plane of the cues at which a level rollout starts.                          [MODEL eq. 6.1, 6.2]
+static double start_distance(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, const approach_t *a)
+{
+    const double accel = (double)model->firmware.approach_accel_mps2, hold_s = model->raw.start_hold_time_s;
+    const double path = 0.5 * a->speed_mps * a->speed_mps / accel + a->speed_mps * hold_s;
     switch ((ivl_sim_start_t)spec->start[0])
     {
     case IVL_SIM_START_FLOWN:
-        return (sin_angle * path > model->raw.start_room_m) ? sin_angle * path : model->raw.start_room_m;
+        return ivl_sim_larger(a->sine * path - a->flees_mps * (a->speed_mps / accel + hold_s), model->raw.start_room_m);
     case IVL_SIM_START_AT_TRIGGER:
         return spec->d_ceil_m[0];
     case IVL_SIM_START_IMPARTED:
     case IVL_SIM_START_STATE:
     case IVL_SIM_START_COUNT:
     default:
-        return speed * sin_angle * 1.0;
+        return (a->speed_mps * a->sine - a->flees_mps) * 1.0;
     }
 }
 
 /// Level and without rotation: hovering for `flown`, else at the approach velocity.
 static void level_start(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, ivl_sim_start_state_t *start)
 {
-    double sin_angle, cos_angle;
-    ivl_sim_sincos(spec->angle_deg[0] * (IVL_SIM_PI / 180.0), &sin_angle, &cos_angle);
+    const approach_t         a = approach_of(model, spec);
     const ivl_sim_surface_t *surface = &model->surface;
     const ivl_d3_t           n = surface->normal_W, forward = ivl_sim_surface_forward(surface);
     const double             height = ivl_sim_surface_height(surface, 0.0);
     const double             plane = height + model->raw.world_sensed_gap_offset_m;
-    const double             speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : spec->speed_mps[0];
+    const double             speed = (spec->start[0] == IVL_SIM_START_FLOWN) ? 0.0 : a.speed_mps;
     const ivl_d3_t           foot = ivl_d3_sub(surface->point_W_m, ivl_d3_scale(height, n));
-    const ivl_d3_t           approach = ivl_d3_add(ivl_d3_scale(speed * cos_angle, forward), ivl_d3_scale(speed * sin_angle, n));
-    ivl_d3_store(start->p_W_m, ivl_d3_add(foot, ivl_d3_scale(plane - start_distance(model, spec, sin_angle), n)));
+    const ivl_d3_t           approach = ivl_d3_add(ivl_d3_scale(speed * a.cosine, forward), ivl_d3_scale(speed * a.sine, n));
+    ivl_d3_store(start->p_W_m, ivl_d3_add(foot, ivl_d3_scale(plane - start_distance(model, spec, &a), n)));
     ivl_d3_store(start->v_W_mps, approach);
     start->q_WB[3] = 1.0;
 }
@@ -106,12 +130,13 @@ static void time_flip(ivl_sim_world_t *world, const ivl_sim_spec_t *spec)
     }
 }
 
-static void request_approach(const ivl_sim_spec_t *spec, const double p_W_m[3], ivl_command_t *cmd)
+static void request_approach(const ivl_sim_model_t *model, const ivl_sim_spec_t *spec, const double p_W_m[3], ivl_command_t *cmd)
 {
+    const approach_t a = approach_of(model, spec);
     cmd->request = IVL_REQUEST_APPROACH;
     cmd->p_hover_W_m = (ivl_vec3_t){(float)p_W_m[0], (float)p_W_m[1], (float)p_W_m[2]};
-    cmd->speed_mps = (float)spec->speed_mps[0];
-    cmd->angle_rad = (float)(spec->angle_deg[0] * (IVL_SIM_PI / 180.0));
+    cmd->speed_mps = (float)a.speed_mps;
+    cmd->angle_rad = (float)a.angle_rad;
 }
 
 /// True if some part of the vehicle reaches beyond the surface: no landing can begin there.
@@ -160,7 +185,12 @@ bool ivl_sim_rollout_start(ivl_sim_group_t *group, int lane, const ivl_sim_spec_
     {
         return false;
     }
-    request_approach(spec, start.p_W_m, &world->in.cmd);
+    request_approach(model, spec, start.p_W_m, &world->in.cmd);
+    const bool moves = fabs(model->raw.surface_speed_along_mps) + fabs(model->raw.surface_speed_away_mps) > 0.0;
+    if (moves && !ivl_sense_command_good(&model->firmware, &world->in.cmd))
+    {
+        return false;  // in the world too slow or too fast, or away from a surface that comes nearer
+    }
     const ivl_policy_t policy = ivl_sim_policy(spec->form[0], spec->theta, spec->start[0] == IVL_SIM_START_AT_TRIGGER);
     if (spec->flip_at_s[0] > 0.0 && ivl_form((uint32_t)spec->form[0]) != &ivl_form_constant)
     {
@@ -182,6 +212,14 @@ void ivl_sim_outcome_clear(ivl_sim_outcome_t *o)
     }
 }
 
+/// Velocity as seen from the surface: forward along it, and towards it.
+static void seen_from_surface(const ivl_sim_surface_t *surface, const double v_W_mps[3], double *along_mps, double *closing_mps)
+{
+    const ivl_d3_t v = ivl_d3_load(v_W_mps);
+    *along_mps = ivl_d3_dot(ivl_sim_surface_forward(surface), ivl_sim_surface_tangential(surface, v));
+    *closing_mps = ivl_sim_surface_closing(surface, v);
+}
+
 /// Truth at the tick at which the flight core triggered, and what it saw.
 static void note_trigger(const ivl_sim_group_t *group, int lane, ivl_sim_outcome_t *o)
 {
@@ -191,8 +229,7 @@ static void note_trigger(const ivl_sim_group_t *group, int lane, ivl_sim_outcome
     const ivl_sim_params_t *raw = &world->model->raw;
     o->triggered[0] = 1;
     o->t_trigger_s[0] = ivl_sim_world_time_s(group, lane);
-    o->vx_trigger_mps[0] = before->v_WB_mps[0];
-    o->vz_trigger_mps[0] = before->v_WB_mps[2];
+    seen_from_surface(&world->model->surface, before->v_WB_mps, o->vx_trigger_mps, o->vz_trigger_mps);
     o->rate_trigger_radps[0] = -before->w_B_radps[1];
     o->d_trigger_m[0] = (double)firmware->snapshot.d_ceil_m;
     o->d_true_trigger_m[0] = ivl_sim_world_surface_m(group, lane) + raw->world_sensed_gap_offset_m -
@@ -241,8 +278,7 @@ static void note_end(const ivl_sim_group_t *group, int lane, ivl_sim_end_t end, 
         const ivl_sim_kin_t *kin = &world->impact.kin;
         o->t_impact_s[0] = world->impact.t_s;
         o->theta_impact_deg[0] = pitch_deg(kin);
-        o->vx_impact_mps[0] = kin->v_WB_mps[0];
-        o->vz_impact_mps[0] = kin->v_WB_mps[2];
+        seen_from_surface(&world->model->surface, kin->v_WB_mps, o->vx_impact_mps, o->vz_impact_mps);
         o->rate_impact_radps[0] = -kin->w_B_radps[1];
     }
 }

@@ -7,7 +7,7 @@
 
 typedef enum
 {
-    IVL_SIM_START_IMPARTED,    ///< level, at the approach velocity, V_z * 1 s below the ceiling (RREV = 1)
+    IVL_SIM_START_IMPARTED,    ///< level, at the approach velocity, closing speed * 1 s before the surface (RREV = 1)
     IVL_SIM_START_FLOWN,       ///< hovering, far enough to reach the speed and hold it for start.hold_time
     IVL_SIM_START_AT_TRIGGER,  ///< level, at the approach velocity, at a stated distance; the flip starts at once
     IVL_SIM_START_STATE,       ///< any state of free flight, for example a recorded one; the approach goes on from there
@@ -17,7 +17,7 @@ typedef enum
 typedef enum
 {
     IVL_SIM_END_CONTACT_TIME,  ///< end.contact_time after the first contact
-    IVL_SIM_END_MISSED,        ///< motors cut, and too slow to reach the ceiling any more
+    IVL_SIM_END_MISSED,        ///< motors cut, and too slow to reach the surface any more
     IVL_SIM_END_MISSED_TIME,   ///< end.missed_time after the trigger, without a contact
     IVL_SIM_END_TIME_MAX,      ///< end.time_max after the start
     IVL_SIM_END_REFUSED,       ///< the flight core refused the policy
@@ -32,15 +32,15 @@ typedef enum
 /// X(c_type, name, count, numpy_type, unit, lo, hi, default, doc)
 // clang-format off
 #define IVL_SIM_SPEC_FIELDS(X) \
-    X(double, speed_mps, 1, "f8", "m/s", 0.1, 6.0, IVL_SIM_REQUIRED, "approach speed V") \
-    X(double, angle_deg, 1, "f8", "deg", 0.0, 90.0, IVL_SIM_REQUIRED, "approach angle phi above the horizontal") \
+    X(double, speed_mps, 1, "f8", "m/s", 0.1, 6.0, IVL_SIM_REQUIRED, "approach speed V, as seen from the surface") \
+    X(double, angle_deg, 1, "f8", "deg", 0.0, 180.0, IVL_SIM_REQUIRED, "approach angle phi, between the velocity as seen from the surface and the surface: above a ceiling's horizontal; beyond 90 backwards along it") \
     X(double, theta, IVL_SIM_THETAS, "f8", "SI", -IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, 0, "policy: parameters of its form, SI; their ranges are those of the form") \
     X(double, d_ceil_m, 1, "f8", "m", 0.02, 10.0, 0.5, "start at_trigger: distance of the body origin from the plane of the cues") \
     X(uint64_t, seed, 1, "u8", "1", 0, 18446744073709551615.0, 0, "of the batch") \
     X(uint64_t, stream, 1, "u8", "1", 0, 18446744073709551615.0, 0, "number of the rollout within the seed") \
     X(int32_t, start, 1, "i4", "1", 0, IVL_SIM_START_COUNT - 1, 0, "0 imparted, 1 flown, 2 at_trigger, 3 state") \
     X(int32_t, form, 1, "i4", "1", 0, 255, 0, "policy: its form, row of IVL_FORMS") \
-    X(double, p_start_W_m, 3, "f8", "m", -100, 100, 0, "start state: body origin in the world, below the ceiling") \
+    X(double, p_start_W_m, 3, "f8", "m", -100, 100, 0, "start state: body origin in the world, before the surface") \
     X(double, v_start_W_mps, 3, "f8", "m/s", -20, 20, 0, "start state: velocity in the world") \
     X(double, q_start_WB, 4, "f8", "1", -1, 1, 0, "start state: attitude, x y z w, of unit length") \
     X(double, w_start_B_radps, 3, "f8", "rad/s", -100, 100, 0, "start state: angular rate in body axes") \
@@ -51,8 +51,8 @@ typedef enum
 #define IVL_SIM_OUTCOME_FIELDS(X) \
     X(int32_t, n_legs, 1, "i4", "1", 0, 4, 0, "feet stuck at the end") \
     X(int8_t, leg_order, 4, "i1", "1", 0, 4, 0, "legs 1..4 in the order of first sticking, then 0") \
-    X(int32_t, body_contact, 1, "i4", "1", 0, 1, 0, "1 if the propeller plate touched the ceiling") \
-    X(int32_t, base_contact, 1, "i4", "1", 0, 1, 0, "1 if the base plate touched the ceiling") \
+    X(int32_t, body_contact, 1, "i4", "1", 0, 1, 0, "1 if the propeller plate touched the surface") \
+    X(int32_t, base_contact, 1, "i4", "1", 0, 1, 0, "1 if the base plate touched the surface") \
     X(int32_t, end_reason, 1, "i4", "1", 0, IVL_SIM_END_COUNT - 1, 0, "why the rollout ended") \
     X(int32_t, triggered, 1, "i4", "1", 0, 1, 0, "1 if the flip was started") \
     X(int32_t, decided, 1, "i4", "1", 0, 1, 0, "1 if the policy was asked whether to go") \
@@ -61,11 +61,11 @@ typedef enum
     X(double, t_impact_s, 1, "f8", "s", 0, 60, IVL_SIM_REQUIRED, "time of the first contact") \
     X(double, t_end_s, 1, "f8", "s", 0, 60, IVL_SIM_REQUIRED, "duration of the rollout") \
     X(double, theta_impact_deg, 1, "f8", "deg", -3600, 3600, IVL_SIM_REQUIRED, "nose-up rotation about b_y at the first contact, unwrapped") \
-    X(double, vx_trigger_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "true velocity along x at the trigger") \
-    X(double, vz_trigger_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "true velocity along z at the trigger") \
+    X(double, vx_trigger_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "true speed forward along the surface, as seen from there, at the trigger; of a ceiling at rest along x") \
+    X(double, vz_trigger_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "true closing speed at the trigger; of a ceiling at rest along z") \
     X(double, rate_trigger_radps, 1, "f8", "rad/s", -200, 200, IVL_SIM_REQUIRED, "nose-up rate at the trigger") \
-    X(double, vx_impact_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "velocity along x at the first contact") \
-    X(double, vz_impact_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "velocity along z at the first contact") \
+    X(double, vx_impact_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "speed forward along the surface at the first contact") \
+    X(double, vz_impact_mps, 1, "f8", "m/s", -20, 20, IVL_SIM_REQUIRED, "closing speed at the first contact") \
     X(double, rate_impact_radps, 1, "f8", "rad/s", -200, 200, IVL_SIM_REQUIRED, "nose-up rate at the first contact") \
     X(double, d_trigger_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "sensed distance latched at the trigger") \
     X(double, d_true_trigger_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "true distance from the plane of the cues at the trigger") \
@@ -75,7 +75,7 @@ typedef enum
     X(double, of_y_trigger, 1, "f8", "rad/s", -1000, 1000, IVL_SIM_REQUIRED, "OF_y latched at the trigger") \
     X(double, p_land, 1, "f8", "1", 0, 1, IVL_SIM_REQUIRED, "probability of a landing by which go or no-go was decided") \
     X(double, d_decided_m, 1, "f8", "m", 0, 20, IVL_SIM_REQUIRED, "sensed distance at which go or no-go was decided") \
-    X(double, d_min_m, 1, "f8", "m", -1, 20, IVL_SIM_REQUIRED, "smallest distance of the body origin from the ceiling's surface") \
+    X(double, d_min_m, 1, "f8", "m", -1, 20, IVL_SIM_REQUIRED, "smallest distance of the body origin from the surface") \
     X(uint32_t, n_steps, 1, "u4", "1", 0, 4294967295.0, 0, "integration steps") \
     X(uint32_t, n_ticks, 1, "u4", "1", 0, 4294967295.0, 0, "ticks of the flight core's clock")
 

@@ -11,6 +11,7 @@ static ivl_ceiling_t ceiling_at(float z_m, bool fresh)
     sense.age_s = 0.012f;
     sense.sample.p_WB_m = ivl_vec3(3.0f, -2.0f, z_m);
     sense.sample.v_WB_mps = ivl_vec3(1.0f, 0.5f, 2.5f);
+    see(&cfg, &sense);
     return ivl_ceiling_compute(&cfg, &sense);
 }
 
@@ -59,8 +60,10 @@ static void test_a_held_sample_is_carried_to_the_present_tick_if_asked(void)
     sense.age_s = 0.012f;
     sense.sample.p_WB_m.z = 1.6f;
     sense.sample.v_WB_mps.z = 2.5f;
+    see(&cfg, &sense);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.47f, ivl_ceiling_compute(&cfg, &sense).d_ceil_m);
     sense.sample.v_WB_mps.z = -2.5f;
+    see(&cfg, &sense);
     TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.53f, ivl_ceiling_compute(&cfg, &sense).d_ceil_m);
 }
 
@@ -73,6 +76,7 @@ static void test_a_height_that_is_hardly_known_gives_no_distance(void)
     sense.pose_fresh = true;
     sense.sample.p_WB_m.z = 1.6f;
     cfg.height_sigma_m = 0.12f;
+    see(&cfg, &sense);
     TEST_ASSERT_EQUAL_FLOAT(0.12f, ivl_ceiling_compute(&cfg, &sense).d_sigma_m);
     cfg.height_sigma_m = 0.13f;
     TEST_ASSERT_FALSE(ivl_ceiling_compute(&cfg, &sense).valid);

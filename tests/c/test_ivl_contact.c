@@ -18,6 +18,7 @@ void setUp(void)
 static void feel(float x, float y, float z)
 {
     sense.sample.f_B_mps2 = ivl_vec3(x, y, z);
+    see(&cfg, &sense);
     ivl_contact_update(&cfg, &contact, &sense, DT_S);
 }
 

@@ -4,7 +4,7 @@
 static ivl_cues_t cues_of(float d_ceil_m, ivl_vec3_t v_WB_mps)
 {
     const ivl_ceiling_t ceiling = {.d_ceil_m = d_ceil_m, .v_close_mps = v_WB_mps.z, .valid = true};
-    return ivl_cues_compute(ceiling, v_WB_mps);
+    return ivl_cues_compute(ceiling, v_WB_mps.x);
 }
 
 static void test_cues_have_the_known_values(void)
@@ -24,7 +24,7 @@ static void test_rrev_is_negative_when_departing(void)
 static void test_cues_are_invalid_and_zero_when_the_ceiling_is(void)
 {
     const ivl_ceiling_t bad = {.d_ceil_m = 0.5f, .v_close_mps = 2.5f, .valid = false};
-    const ivl_cues_t    cues = ivl_cues_compute(bad, ivl_vec3(1.0f, 0.0f, 2.5f));
+    const ivl_cues_t    cues = ivl_cues_compute(bad, 1.0f);
     TEST_ASSERT_FALSE(cues.valid);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, cues.rrev_per_s);
     TEST_ASSERT_EQUAL_FLOAT(0.0f, cues.of_y_radps);

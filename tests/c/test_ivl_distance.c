@@ -99,6 +99,7 @@ static ivl_ceiling_t advance(run_t *r)
     tell(r->t_s, r->rrev_period_s, r->rrev_delay_s, &in->rrev, rrev_at, r);
     tell(r->t_s, r->range_period_s, r->range_delay_s, &in->range, range_at, r);
     ivl_sense_update(&r->fix.cfg, &r->fix.state.sense, in, (float)TICK_S);
+    see(&r->fix.cfg, &r->fix.state.sense);
     return ivl_distance_update(&r->fix.cfg, &r->fix.state.distance, &r->fix.state.sense, in, true, (float)TICK_S);
 }
 
@@ -153,6 +154,7 @@ static void test_an_estimate_begins_with_what_the_pose_says(void)
     r.fix.cfg.kf_d_sigma_m = 0.1f;
     r.fix.state.sense.sample.p_WB_m = ivl_vec3(0.3f, -0.4f, 1.2f);
     r.fix.state.sense.sample.v_WB_mps = ivl_vec3(0.7f, -0.5f, 1.3f);
+    see(&r.fix.cfg, &r.fix.state.sense);
     const ivl_sense_t *sense = &r.fix.state.sense;
     (void)ivl_distance_update(&r.fix.cfg, &r.fix.state.distance, sense, &r.fix.in, true, (float)TICK_S);
     TEST_ASSERT_EQUAL_FLOAT(1.3f, r.fix.state.distance.filter.v_mps);

@@ -209,8 +209,8 @@ static void test_only_the_arguments_that_a_request_uses_are_checked(void)
     TEST_ASSERT_TRUE(command_refused((ivl_command_t){IVL_REQUEST_APPROACH, good, 0.05f, 1.0f}));
     TEST_ASSERT_TRUE(command_refused((ivl_command_t){IVL_REQUEST_APPROACH, good, 6.1f, 1.0f}));
     TEST_ASSERT_TRUE(command_refused((ivl_command_t){IVL_REQUEST_APPROACH, good, 1.0f, -0.01f}));
-    TEST_ASSERT_TRUE(command_refused((ivl_command_t){IVL_REQUEST_APPROACH, good, 1.0f, 1.58f}));
-    TEST_ASSERT_FALSE(command_refused((ivl_command_t){IVL_REQUEST_APPROACH, good, 1.0f, (float)1.57079632679489661923}));
+    TEST_ASSERT_TRUE(command_refused((ivl_command_t){IVL_REQUEST_APPROACH, good, 1.0f, 3.15f}));
+    TEST_ASSERT_FALSE(command_refused((ivl_command_t){IVL_REQUEST_APPROACH, good, 1.0f, (float)3.14159265358979323846}));
 }
 
 int main(void)

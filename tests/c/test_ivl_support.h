@@ -59,6 +59,16 @@ static inline ivl_quat_t rng_quat(rng_t *rng)
     }
 }
 
+// ---- stages that are fed by hand
+
+/// What the surface stage makes of the sample.
+static inline void see(const ivl_cfg_t *cfg, ivl_sense_t *sense)
+{
+    ivl_surface_t surface;
+    ivl_surface_init(cfg, &surface);
+    ivl_surface_see(cfg, &surface, &sense->sample, &sense->rel);
+}
+
 // ---- a core with its four structs
 
 typedef struct

@@ -66,8 +66,8 @@ def test_a_wall_and_a_floor() -> None:
     assert wall.axes_W == pytest.approx(np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]))
     assert wall.gap_m([0.5, 9.0, 9.0]) == pytest.approx(1.5)
     floor = Surface((0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
-    assert floor.axes_W == pytest.approx(np.diag([1.0, -1.0, -1.0]))
-    assert floor.q_WS == pytest.approx([1.0, 0.0, 0.0, 0.0])
+    assert floor.axes_W == pytest.approx(np.diag([-1.0, 1.0, -1.0]))
+    assert np.abs(floor.q_WS) == pytest.approx([0.0, 1.0, 0.0, 0.0])
     assert floor.closing_mps([1.0, 0.0, -3.0]) == pytest.approx(3.0)
 
 

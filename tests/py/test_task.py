@@ -16,7 +16,7 @@ from ivl.errors import ConfigError
 from ivl.experiment import Experiment
 from ivl.landing import LandingSpec
 from ivl.settings import check_path
-from ivl.task import Setup, Task
+from ivl.task import Setup, SurfaceChoice, Task
 
 Capture = pytest.CaptureFixture[str]
 ONBOARD = "experiments/onboard_only.yaml"
@@ -41,7 +41,7 @@ def test_every_field_of_the_task_reaches_the_world_or_the_rollout() -> None:
     task = experiment.load("experiments/paper_vertical.yaml")
     changes = {
         "vehicle": "crazyflie21", "gear": "wide_long", "gear_set": "table1", "sensing": "camera50",
-        "estimator": "kalman", "approach": "constant_rrev",
+        "estimator": "kalman", "approach": "constant_rrev", "surface": SurfaceChoice(angle_deg=135.0),
     }  # fmt: skip
     assert set(changes) == set(EQUIPMENT)
     digests = {task.make_world().params.digest()}
@@ -123,7 +123,7 @@ def test_every_field_of_the_task_has_an_option_and_a_text() -> None:
     ("arguments", "complaint"),
     [
         (["--speed", "2.5"], "--angle is missing (or --experiment"),
-        (["--speed", "2.5", "--angle", "95"], "angle_deg: value 95.0 is out of range (allowed 0 .. 90 deg)"),
+        (["--speed", "2.5", "--angle", "185"], "angle_deg: value 185.0 is out of range (allowed 0 .. 180 deg)"),
         (["--speed", "2.5", "--angle", "90", "--estimator", "guess"], "estimator: value 'guess': unknown estimator"),
         (["--speed", "2.5", "--angle", "90", "--approach", "fast"], "approach: value 'fast': unknown approach"),
         (["--speed", "2.5", "--angle", "90", "--set", "sensng=mocap"], "sensng: unknown key, did you mean 'sensing'?"),

@@ -26,7 +26,7 @@ CLOCK_HZ = 168e6
 TICK_HZ = 500.0
 VEHICLE_BUILD = "stm32-Os"
 """Compiled as the vehicle's firmware is: the budget of the flash is that of this build."""
-LIMITS = {"flash_bytes": 18432, "ram_bytes": 2816, "stack_bytes": 512, "instructions_max": 3300, "cpu_percent": 2.0}
+LIMITS = {"flash_bytes": 18932, "ram_bytes": 2816, "stack_bytes": 512, "instructions_max": 3300, "cpu_percent": 2.0}
 MARGINS = {"flash_bytes": 0.03, "ram_bytes": 0.0, "stack_bytes": 0.05, "instructions_max": 0.05, "bound_max": 0.05}
 """Growth over the baseline that is accepted without an update of it."""
 _COUNTED_TICKS = 200_000

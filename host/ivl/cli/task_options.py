@@ -36,12 +36,13 @@ FLAGS: dict[str, tuple[str, ...]] = {
     "approach": ("--approach",),
     "speed_mps": ("--speed",),
     "angle_deg": ("--angle",),
+    "surface": ("--surface",),
     "start": ("--start",),
 }
 """Options of each field; a new field of the task needs a row here."""
-EQUIPMENT = ("vehicle", "gear", "gear_set", "sensing", "estimator", "approach")
+EQUIPMENT = ("vehicle", "gear", "gear_set", "sensing", "estimator", "approach", "surface")
 """Fields that make a world."""
-_KINDS = {"speed_mps": float, "angle_deg": float}
+_KINDS = {"speed_mps": float, "angle_deg": float, "surface": float}
 _LABEL = "options"  # the file that errors name where there is none
 
 
