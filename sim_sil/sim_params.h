@@ -9,6 +9,8 @@
 
 #include <math.h>
 
+#include "camera_params.h"
+
 #define IVL_SIM_REQUIRED  ((double)NAN)
 #define IVL_SIM_UNLIMITED ((double)INFINITY)
 
@@ -112,6 +114,8 @@
     X(flow, resolution, radps, "rad/s", 0.0, 1.0, 0.0, "values are multiples of this; 0: not rounded") \
     X(flow, max, radps, "rad/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
     X(flow, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
+    IVL_CAMERA_LOOP_PARAMS(X) \
+    IVL_CAMERA_PARAMS(X) \
     X(start, hold_time, s, "s", 0.0, 5.0, 0.39, "flown start: time at full speed that is left, before the ceiling would be reached") \
     X(start, room, m, "m", 0.0, 10.0, 0.0, "flown start: at least this far below the plane of the cues, for an approach faster than commanded") \
     X(end, contact_time, s, "s", 0.01, 10.0, 1.0, "a rollout ends this long after the first contact") \

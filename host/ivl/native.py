@@ -294,6 +294,17 @@ class NativeModel:
         self._library._c.ivl_sil_model_surface(self._handle, _pointer(record))
         return record
 
+    def give_camera(self, texture: Any) -> None:
+        """Give the camera of `camera.rate` a surface to look at (`ivl.camera.native.Texture`); once.
+
+        Raises:
+            NativeError: The estimator refuses the camera, or there is no memory.
+        """
+        result = int(self._library._c.ivl_sil_model_camera(self._handle, texture.handle))
+        if result:
+            raise NativeError(("the estimator refuses this camera", "there is not enough memory")[result - 1])
+        weakref.finalize(self, _keep, texture)
+
     def config(self) -> tuple[npt.NDArray[np.void], int]:
         """The flight core's configuration, one record of the layout `LAYOUT_CONFIG`, and its CRC-32."""
         record = np.zeros(1, dtype=self._library.layout(LAYOUT_CONFIG)[1])
@@ -421,6 +432,10 @@ class NativeModel:
         return rows
 
 
+def _keep(_: object) -> None:
+    """Holds a reference until its owner is gone."""
+
+
 @cache
 def library() -> NativeLibrary:
     """The library of this process, loaded on first use."""
@@ -439,6 +454,7 @@ def _declare(c: Any) -> None:
         ("ivl_sil_model_free", None, (ptr,)),
         ("ivl_sil_model_derived", None, (ptr, ptr)),
         ("ivl_sil_model_surface", None, (ptr, ptr)),
+        ("ivl_sil_model_camera", c_int, (ptr, ptr)),
         ("ivl_sil_surface_forward", None, (ptr, ptr)),
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),

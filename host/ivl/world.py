@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ivl import forms, model, native
-from ivl.errors import ArgumentError, NativeError
+from ivl.camera import textures
+from ivl.errors import ArgumentError, ConfigError, NativeError
 from ivl.outcome import as_dict, verdict
 from ivl.surface import Surface
 from ivl.table import Rollouts, Rows
@@ -142,6 +143,7 @@ class World:
         gear: str = model.DEFAULT_GEAR,
         gear_set: str = model.DEFAULT_GEAR_SET,
         sensing: str | None = None,
+        texture: str | None = None,
         **overrides: float,
     ) -> None:
         """Read, check and assemble the files and build the native model.
@@ -151,6 +153,7 @@ class World:
             gear: Name of a design in the gear set.
             gear_set: Name of a shipped gear set, or a path to a YAML file.
             sensing: Name of a shipped sensor set, or a path to a YAML file; it replaces the vehicle's own sensing.
+            texture: Surface that a rendered camera looks at, a name or a picture file, in place of the sensor set's.
             **overrides: Parameter values by dotted name, in the unit of the parameter table.
 
         Raises:
@@ -159,7 +162,10 @@ class World:
         """
         self.vehicle, self.gear, self.gear_set, self.sensing = vehicle, gear, gear_set, sensing
         self.overrides = dict(overrides)
-        self._build(model.assemble(_parts(vehicle, gear, gear_set, sensing), overrides))
+        parts = _parts(vehicle, gear, gear_set, sensing)
+        params = model.assemble(parts, overrides)
+        self.texture = _texture_of(params, parts[-1], texture)
+        self._build(params)
 
     def _build(self, params: model.Parameters) -> None:
         self.params = params
@@ -168,11 +174,15 @@ class World:
             self._native = self._library.create_model(params.vector())
         except NativeError as error:
             raise NativeError(f"vehicle {self.vehicle}, gear {self.gear_set}/{self.gear}: {error}") from error
+        if params.values["camera.rate"] > 0.0:
+            if self.texture is None:
+                raise ConfigError("camera.rate: a camera needs a surface to look at: give a texture")
+            self._native.give_camera(textures.make(self.texture, params.values["camera.texture_length"]))
         self.surface = Surface.of(self._native)
 
     def __getstate__(self) -> dict[str, Any]:
         """What pickling carries: the checked parameters, never the files' names alone nor the native handle."""
-        names = ("vehicle", "gear", "gear_set", "sensing", "overrides", "params")
+        names = ("vehicle", "gear", "gear_set", "sensing", "texture", "overrides", "params")
         return {name: getattr(self, name) for name in names}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -184,6 +194,7 @@ class World:
         """The call that makes this world."""
         extra = "".join(f", {name}={value!r}" for name, value in self.overrides.items())
         sensing = f", sensing={self.sensing!r}" if self.sensing else ""
+        sensing += f", texture={self.texture!r}" if self.texture else ""
         return f"World(vehicle={self.vehicle!r}, gear={self.gear!r}, gear_set={self.gear_set!r}{sensing}{extra})"
 
     def changed(self, **overrides: float) -> "World":
@@ -534,6 +545,22 @@ def _parts(vehicle: str, gear: str, gear_set: str, sensing: str | None) -> list[
     if sensing is not None:
         parts = [model.without_sensors(airframe), parts[1], model.load_sensors(sensing)]
     return parts
+
+
+def _texture_of(params: model.Parameters, sensors: model.Part, texture: str | None) -> str | None:
+    """The surface that the camera looks at; None where there is no camera.
+
+    Raises:
+        ConfigError: A surface is given and there is no camera.
+    """
+    if params.values["camera.rate"] > 0.0:
+        return texture or sensors.texture
+    if texture is not None:
+        raise ConfigError(
+            f"texture {texture!r}: {sensors.label} has no camera that looks at it (camera.rate is 0): "
+            "choose a sensor set with one, such as aideck60"
+        )
+    return None
 
 
 def _numbers(name: str, value: npt.ArrayLike | None) -> npt.NDArray[Any]:

@@ -36,7 +36,7 @@ double ivl_camera_undistorted(const ivl_camera_params_t *p, double r2)
     for (int i = 0; i < UNDISTORT_ITERATIONS; i++)
     {
         const double q = s * s * r2;
-        s = 1.0 / (1.0 + q * (p->radial_1 + q * p->radial_2));
+        s = 1.0 / (1.0 + q * (p->radial_1_norm + q * p->radial_2_norm));
     }
     return s;
 }
@@ -52,7 +52,7 @@ void ivl_camera_init(const ivl_camera_params_t *params, ivl_camera_t *camera)
         for (int x = 0; x < camera->width; x++)
         {
             const double u = (x - 0.5 * (camera->width - 1)) / params->focal_px, v = (y - 0.5 * (camera->height - 1)) / params->focal_px;
-            const double s = ivl_camera_undistorted(params, u * u + v * v), fall = 1.0 + params->vignetting * s * s * (u * u + v * v);
+            const double s = ivl_camera_undistorted(params, u * u + v * v), fall = 1.0 + params->vignetting_norm * s * s * (u * u + v * v);
             const int    at = y * camera->width + x;
             camera->u[at] = (float)(s * u);
             camera->v[at] = (float)(s * v);
@@ -61,8 +61,8 @@ void ivl_camera_init(const ivl_camera_params_t *params, ivl_camera_t *camera)
     }
     for (int grey = 0; grey < 256; grey++)
     {
-        const double light = (grey > params->black) ? grey - params->black : 0.0;
-        camera->noise[grey] = (float)sqrt(light / params->electrons_per_grey + params->read_noise * params->read_noise);
+        const double light = (grey > params->black_norm) ? grey - params->black_norm : 0.0;
+        camera->noise[grey] = (float)sqrt(light / params->electrons_per_grey_norm + params->read_noise_norm * params->read_noise_norm);
     }
 }
 
@@ -74,8 +74,8 @@ static double flicker(const ivl_camera_params_t *p, double t_s)
         return 1.0;
     }
     double       s, c, half_s, half_c;
-    const double half = IVL_SIM_PI * p->flicker_hz * p->exposure_s;
-    ivl_sim_sincos(2.0 * IVL_SIM_PI * p->flicker_hz * t_s, &s, &c);
+    const double half = IVL_SIM_PI * p->flicker_rate_hz * p->exposure_s;
+    ivl_sim_sincos(2.0 * IVL_SIM_PI * p->flicker_rate_hz * t_s, &s, &c);
     ivl_sim_sincos(half, &half_s, &half_c);
     return 1.0 + p->flicker_norm * c * half_s / half;
 }
@@ -124,7 +124,7 @@ static board_t board_of(const ivl_camera_t *camera, const ivl_camera_texture_t *
 {
     const ivl_camera_params_t *p = &camera->params;
     const double               k = texture->texels_per_m, far = 1.0e9;
-    board_t                    board = {.ends = p->board_x_m > 0.0 || p->board_y_m > 0.0, .background = (float)p->background};
+    board_t                    board = {.ends = p->board_x_m > 0.0 || p->board_y_m > 0.0, .background = (float)p->background_norm};
     const double half_x = (p->board_x_m > 0.0) ? 0.5 * p->board_x_m : far, half_y = (p->board_y_m > 0.0) ? 0.5 * p->board_y_m : far;
     board.x_lo = (float)((p->board_at_x_m - half_x) * k);
     board.x_hi = (float)((p->board_at_x_m + half_x) * k);
@@ -154,7 +154,7 @@ static float brightness(const ivl_camera_texture_t *texture, const board_t *boar
     {
         return board->background;
     }
-    return ivl_camera_texture_look(texture, x, y, board->level);
+    return ivl_camera_texture_look(texture, x + texture->at_x_texel, y + texture->at_y_texel, board->level);
 }
 
 static uint8_t to_grey(float value)
@@ -186,7 +186,7 @@ static void add_noise(const ivl_camera_t *camera, const ivl_sim_rng_t *rng, uint
 static int look_through_row(const ivl_camera_t *camera, const ivl_camera_texture_t *texture, const ivl_camera_pose_t *pose, double row_s,
                             map_t maps[SAMPLES_MAX])
 {
-    const int asked = (int)camera->params.blur_samples, n = (asked > 0) ? asked : INTERLEAVED;
+    const int asked = (int)camera->params.blur_norm, n = (asked > 0) ? asked : INTERLEAVED;
     for (int i = 0; i < n; i++)
     {
         maps[i] = look(camera, texture, pose, row_s + ((i + 0.5) / n - 0.5) * camera->params.exposure_s);
@@ -203,7 +203,7 @@ void ivl_camera_render(const ivl_camera_t *camera, const ivl_camera_texture_t *t
         // the rows of a 2 x 2 block take the instants 0, 2 and 3, 1: the mean of a block has no preferred direction in time
         static const int TURN[2][2] = {{0, 2}, {3, 1}};
         const double     row_s = (y - 0.5 * (camera->height - 1)) * camera->params.row_time_s;
-        const float      light = (float)((camera->params.white - camera->params.black) * flicker(&camera->params, pose->t_s + row_s));
+        const float      light = (float)((camera->params.white_norm - camera->params.black_norm) * flicker(&camera->params, pose->t_s + row_s));
         map_t            maps[SAMPLES_MAX];
         const int        n = look_through_row(camera, texture, pose, row_s, maps);
         float            clean[IVL_CAMERA_WIDTH_MAX];
@@ -216,7 +216,7 @@ void ivl_camera_render(const ivl_camera_t *camera, const ivl_camera_texture_t *t
                 sum += brightness(texture, &board, &maps[i], camera->u[at], camera->v[at]);
             }
             sum = (n > 0) ? sum / (float)n : brightness(texture, &board, &maps[TURN[y & 1][x & 1]], camera->u[at], camera->v[at]);
-            clean[x] = (float)camera->params.black + light * camera->light[at] * sum;
+            clean[x] = (float)camera->params.black_norm + light * camera->light[at] * sum;
         }
         add_noise(camera, rng, picture, y, clean, grey + y * camera->width);
     }

@@ -26,6 +26,8 @@ void ivl_camera_texture_init(uint16_t *texels, int size, double length_m, ivl_ca
 {
     texture->size = size;
     texture->texels_per_m = size / length_m;
+    texture->at_x_texel = 0.0f;
+    texture->at_y_texel = 0.0f;
     texture->n_levels = 1;
     texture->level[0] = texels;
     for (int side = size; side > 1 && texture->n_levels < IVL_CAMERA_TEXTURE_LEVELS; side /= 2)

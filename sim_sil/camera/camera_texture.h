@@ -17,6 +17,7 @@ typedef struct
     int             size;                              ///< of the finest, a power of two
     int             n_levels;
     double          texels_per_m;
+    float           at_x_texel, at_y_texel;  ///< of the surface's origin
 } ivl_camera_texture_t;
 
 /// Number of texels of all levels.

@@ -76,7 +76,7 @@ class Camera:
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of a picture."""
-        width = 320 if self["width_px"] > 240.0 else 160
+        width = 320 if self["width"] > 240.0 else 160
         return width * 3 // 4, width
 
 
