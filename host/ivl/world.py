@@ -327,6 +327,29 @@ class World:
         rows, outcome = self._native.trace(specs(slice(0, 1)), period_s)
         return Trace(rows.view(Rows), outcome.view(np.recarray)[0])
 
+    def specification(
+        self,
+        speed_mps: float,
+        angle_deg: float,
+        *theta: float,
+        form: str = forms.PAPER,
+        seed: int = 0,
+        start: str = "imparted",
+        d_ceil_m: float | None = None,
+        stream: int = 0,
+        state: State | None = None,
+        flip_at_s: float | None = None,
+        **named: float,
+    ) -> npt.NDArray[np.void]:
+        """The checked record of one rollout for further calls of the library (arguments and errors as `trace`)."""
+        specs, shape, _ = self._specs(
+            start, stream, state, form, theta, named,
+            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed, flip_at_s=flip_at_s,
+        )  # fmt: skip
+        if shape != ():
+            raise ArgumentError(f"the arguments must be scalars, they broadcast to {shape}")
+        return specs(slice(0, 1))
+
     def approaches(
         self,
         speed_mps: FloatLike,

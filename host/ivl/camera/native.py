@@ -74,6 +74,11 @@ class Camera:
         return float(self.values[list(parameters()).index(name)])
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Its numbers by name."""
+        return tuple(parameters())
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of a picture."""
         width = 320 if self["width"] > 240.0 else 160
