@@ -99,6 +99,11 @@
     X(rrev, noise_rel, norm, "1", 0.0, 1.0, 0.0, "and part of the value; the two are independent") \
     X(rrev, resolution, per_s, "1/s", 0.0, 1.0, 0.0, "values are multiples of this; 0: not rounded") \
     X(rrev, max, per_s, "1/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
+    X(rrev, mean_rel, norm, "1", -0.5, 0.5, 0.0, "mean error, part of the value") \
+    X(rrev, bias_rel, norm, "1", 0.0, 0.5, 0.0, "standard deviation of an error that is a part of the value, drawn once a rollout") \
+    X(rrev, correlation, norm, "1", 0.0, 0.99, 0.0, "of the noise of two samples in a row") \
+    X(rrev, outlier, norm, "1", 0.0, 1.0, 0.0, "chance that a sample has a further error") \
+    X(rrev, outlier_rel, norm, "1", 0.0, 10.0, 0.0, "standard deviation of that error, part of the value") \
     X(rrev, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
     X(range, rate, hz, "Hz", 0.0, 500.0, 0.0, "ranging sensor along b_z: samples per second; 0: there is none") \
     X(range, delay, s, "s", 0.0, 0.12, 0.0, "from the sampling instant to the arrival") \
@@ -113,6 +118,10 @@
     X(flow, noise, radps, "rad/s", 0.0, 10.0, 0.0, "standard deviation of a sample") \
     X(flow, resolution, radps, "rad/s", 0.0, 1.0, 0.0, "values are multiples of this; 0: not rounded") \
     X(flow, max, radps, "rad/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
+    X(flow, bias, radps, "rad/s", 0.0, 5.0, 0.0, "standard deviation of the offset, drawn once a rollout") \
+    X(flow, correlation, norm, "1", 0.0, 0.99, 0.0, "of the noise of two samples in a row") \
+    X(flow, outlier, norm, "1", 0.0, 1.0, 0.0, "chance that a sample has a further error") \
+    X(flow, outlier_size, radps, "rad/s", 0.0, 50.0, 0.0, "standard deviation of that error") \
     X(flow, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
     IVL_CAMERA_LOOP_PARAMS(X) \
     IVL_CAMERA_PARAMS(X) \

@@ -87,7 +87,6 @@ class LandingSpec(Task):
             raise ArgumentError(f"this landing cannot begin: {CANNOT_BEGIN}")
         return world, trace
 
-
     def film(self, world: World) -> "Film":
         """Fly it again, and keep what its camera saw, pictures included.
 

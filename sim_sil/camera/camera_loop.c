@@ -58,7 +58,8 @@ static ivl_camera_pose_t pose_of(const ivl_sim_look_t *at)
     return pose;
 }
 
-static void write_down(ivl_camera_film_t *film, const ivl_sim_look_t *at, const ivl_vision_out_t *reading, const uint8_t *grey, size_t pixels)
+static void write_down(ivl_camera_film_t *film, const ivl_sim_look_t *at, const ivl_vision_out_t *reading, const uint8_t *grey,
+                       size_t pixels)
 {
     if (film->n < film->capacity)
     {

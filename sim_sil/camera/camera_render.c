@@ -242,7 +242,8 @@ static void brightness_of_row(const ivl_camera_t *camera, const ivl_camera_textu
             }
             continue;
         }
-        const ivl_camera_four_t look = ivl_camera_texture_look_four(texture, x + texture->at_x_texel, y + texture->at_y_texel, board->level);
+        const ivl_camera_four_t look =
+            ivl_camera_texture_look_four(texture, x + texture->at_x_texel, y + texture->at_y_texel, board->level);
         memcpy(out + i, &look, sizeof look);
     }
 }
@@ -271,11 +272,11 @@ void ivl_camera_render(const ivl_camera_t *camera, const ivl_camera_texture_t *t
         // the rows of a 2 x 2 block take the instants 0, 2 and 3, 1: the mean of a block has no preferred direction in time
         static const int TURN[2][2] = {{0, 2}, {3, 1}};
         const double     row_s = (y - 0.5 * (camera->height - 1)) * camera->params.row_time_s;
-        const float      light = (float)((camera->params.white_norm - camera->params.black_norm) * flicker(&camera->params, pose->t_s + row_s));
-        const float     *u = camera->u + y * camera->width, *v = camera->v + y * camera->width, *fall = camera->light + y * camera->width;
-        map_t            maps[SAMPLES_MAX];
-        const int        n = look_through_row(camera, texture, pose, row_s, maps), *turn = TURN[y & 1];
-        float            clean[IVL_CAMERA_WIDTH_MAX];
+        const float  light = (float)((camera->params.white_norm - camera->params.black_norm) * flicker(&camera->params, pose->t_s + row_s));
+        const float *u = camera->u + y * camera->width, *v = camera->v + y * camera->width, *fall = camera->light + y * camera->width;
+        map_t        maps[SAMPLES_MAX];
+        const int    n = look_through_row(camera, texture, pose, row_s, maps), *turn = TURN[y & 1];
+        float        clean[IVL_CAMERA_WIDTH_MAX];
         if (n > 0)
         {
             mean_of_row(camera, texture, &board, maps, n, u, v, clean);

@@ -175,7 +175,7 @@ long ivl_sil_camera_film(const void *model, const void *spec, size_t capacity, d
 {
     const ivl_sim_model_t *m = model;
     single_t               single = {{spec, outcome, NULL}, false};
-    ivl_camera_film_t film = {.looks = (ivl_sim_look_t *)(void *)rows, .readings = readings, .grey = grey, .capacity = capacity};
+    ivl_camera_film_t      film = {.looks = (ivl_sim_look_t *)(void *)rows, .readings = readings, .grey = grey, .capacity = capacity};
     if (m->eye.context == NULL || !fly_filmed(m, &film, &single))
     {
         return -1;

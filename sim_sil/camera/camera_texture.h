@@ -19,7 +19,7 @@ typedef struct
 {
     const uint16_t *level[IVL_CAMERA_TEXTURE_LEVELS];  ///< 65535 is white
     int             size;                              ///< of the finest, a power of two
-    int             size_bits;  ///< its binary logarithm
+    int             size_bits;                         ///< its binary logarithm
     int             n_levels;
     double          texels_per_m;
     float           at_x_texel, at_y_texel;  ///< of the surface's origin

@@ -13,11 +13,11 @@ enum
 
 typedef struct
 {
-    double   due_s;      ///< arrival
-    double   sampled_s;  ///< instant of the cues, less what the sender does not know of: what the core takes for their arrival
-    float    rrev_per_s, of_y_radps;
-    uint8_t  valid;
-    uint8_t  lost;
+    double  due_s;      ///< arrival
+    double  sampled_s;  ///< instant of the cues, less what the sender does not know of: what the core takes for their arrival
+    float   rrev_per_s, of_y_radps;
+    uint8_t valid;
+    uint8_t lost;
 } ivl_sim_sighting_t;
 
 typedef struct

@@ -106,12 +106,13 @@ def rollout(
             raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")
     spec = yamlfile.validate(LandingSpec, {**data, **policy, **numbers}, "options")
     world, flight = spec.fly()
+    seen = spec.film(world) if frames else None
     if trace:
         tracefile.write(trace, flight.rows)
     if plot:
         _draw(world, flight, plot)
-    if frames:
-        video.save(spec.film(world), frames)
+    if frames and seen:
+        video.save(seen, frames)
     result = _result(world, flight)
     if as_json:
         console.print_json(result)
