@@ -45,7 +45,8 @@ class Setup(Strict):
     )
     texture: str | None = Field(
         default=None,
-        description=f"Surface that a rendered camera sees, in place of the sensor set's: {', '.join(TEXTURES)}, or a picture (.png).",
+        description="Surface that a rendered camera sees, in place of the sensor set's: "
+        f"{', '.join(TEXTURES)}, or a picture (.png).",
     )
     estimator: Annotated[str, AfterValidator(_estimator)] | None = Field(
         default=None,

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline  # type: ignore[import-untyped]
 
 from ivl import files
 from ivl.camera.native import ROW_DOUBLES, STATUS, Camera, Seen, reading_dtype
@@ -45,7 +45,8 @@ class Film:
 
     Attributes:
         camera: The camera.
-        rows: Shape (n, 18), as for `ivl.camera.native.look`: from where each picture was taken, and the attitude as told.
+        rows: Shape (n, 18), as for `ivl.camera.native.look`: from where each picture was taken, and the attitude as
+            told.
         seen: Readings and, if they were asked for, pictures.
         outcome: Outcome of the landing.
     """

@@ -10,6 +10,7 @@ constant part and one of the value, correlated from sample to sample, outliers, 
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -78,7 +79,7 @@ class Model:
 
 def of_films(films: list[Film]) -> Errors:
     """Errors of all readings but the first of each landing, which has nothing to compare with."""
-    columns: list[list[Vector]] = [[] for _ in Errors.__dataclass_fields__]
+    columns: list[list[npt.NDArray[Any]]] = [[] for _ in Errors.__dataclass_fields__]
     for number, each in enumerate(films):
         if len(each) < 2:
             continue
@@ -201,7 +202,7 @@ def _offsets(landing: npt.NDArray[np.int64], part: Vector) -> tuple[float, float
 
 def _law(rrev: Vector, error: Vector, bias: float) -> tuple[float, float]:
     """Constant part of the noise and that of the value, beside what each landing has of its own."""
-    from scipy.optimize import nnls
+    from scipy.optimize import nnls  # type: ignore[import-untyped]
 
     edges = np.quantile(rrev, np.linspace(0.0, 1.0, _BINS + 1))
     bins = np.clip(np.searchsorted(edges, rrev, side="right") - 1, 0, _BINS - 1)

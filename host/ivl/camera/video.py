@@ -56,7 +56,7 @@ def write(film: Film, path: Path) -> None:
 
 
 def _gif(film: Film, path: Path) -> None:
-    first, *rest = (Image.fromarray(frame) for frame in frames(film))
+    first, *rest = (Image.fromarray(frame).quantize(64, Image.Quantize.FASTOCTREE) for frame in frames(film))
     first.save(path, save_all=True, append_images=rest, duration=1000 // FRAMES_PER_S, loop=0)
 
 

@@ -72,8 +72,9 @@ def fit_command(
     model = fit.of_world(world, approaches, seed)
     if out is not None:
         name = out.stem
-        source = f"ivl camera fit --sensing {world.sensing} --texture {world.texture} --approaches {approaches} --seed {seed}"
-        doc = f"Noise model of {world.sensing} over the surface {world.texture}, fitted to rendered readings; no pictures."
+        what = f"--sensing {world.sensing} --texture {world.texture}"
+        source = f"ivl camera fit {what} --approaches {approaches} --seed {seed}"
+        doc = f"Noise model of {world.sensing} over {world.texture}, fitted to rendered readings; no pictures."
         try:
             with files.replacing(out) as part:
                 part.write_text(fit.as_yaml(model, name, doc, source, world), encoding="utf-8")
@@ -84,8 +85,8 @@ def fit_command(
         return
     console.out.print(f"{model.n} readings of {approaches} approaches")
     for name, value in model.numbers.items():
-        error = f" +- {model.sigma[name]:.2g}" if name in model.sigma else ""
-        console.out.print(f"rrev.{name:14s} {value:.5g}{error}")
+        spread = f" +- {model.sigma[name]:.2g}" if name in model.sigma else ""
+        console.out.print(f"rrev.{name:14s} {value:.5g}{spread}")
 
 
 LANDINGS_HELP = """How often pictures land, and how often their noise model does.
@@ -121,8 +122,8 @@ def landings(
         f"policy chosen with the model: RREV_c {result.rrev_c_per_s:.2f} 1/s, M_yd {result.moment_Nmm:g} N mm"
     )
     for what, rate in (("pictures", result.pictures), ("model", result.model)):
-        error = (rate * (1.0 - rate) / rollouts) ** 0.5
-        console.out.print(f"{what:9s} {100 * rate:5.1f} % +- {100 * error:.1f} land on four feet")
+        spread = (rate * (1.0 - rate) / rollouts) ** 0.5
+        console.out.print(f"{what:9s} {100 * rate:5.1f} % +- {100 * spread:.1f} land on four feet")
 
 
 def _looking(chosen: Chosen) -> World:

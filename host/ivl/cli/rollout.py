@@ -37,8 +37,8 @@ Examples:
   ivl rollout --run runs/paper_vertical-ephe-seed0 --plot landing.png
       what a run has learned, on the vehicle, gear and approach that it flew
   ivl rollout --sensing aideck60 --texture panels --plot p.png --frames f.mp4
-      pictures of panels in the loop, and a video of what the camera saw; with a sensor set, and nothing said of approach
-      and policy, the landing of experiments/onboard_camera.yaml
+      pictures of panels in the loop, and a video of what the camera saw; with a sensor set, and nothing said of
+      approach and policy, the landing of experiments/onboard_camera.yaml
   ivl rollout --policy g.yaml --speed 1.2 --angle 35 --plot landing.png
       a policy for every approach (ivl policy learn), on what it was learned on, unless other options say otherwise; if
       it calls the approach off, the verdict says no_go, and the picture shows how the vehicle levels out
@@ -75,18 +75,12 @@ def rollout(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Fly one landing; HELP is the text that people see."""
-    if trace:
-        tracefile.check_suffix(trace)
-    if plot and plot.suffix not in (".png", ".svg", ".pdf"):
-        raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
-    if frames:
-        video.check_suffix(frames)
+    _check_files(trace, plot, frames)
     said = {"form": form, "theta": theta, "rrev": rrev, "moment": moment}
     learned = policy_options.load(policy_file, **said)
     if run_folder is not None:
         policy_options.only("--run", run_folder, policy=policy_file, experiment=chosen.path, **said)
-    shown = _shown(chosen, policy_file, run_folder, **said)
-    if shown:
+    if _shown(chosen, policy_file, run_folder, **said):
         chosen = replace(chosen, given={**SHOWN, **chosen.given})
         rrev, moment = SHOWN_POLICY
     name = form or forms.PAPER
@@ -101,9 +95,7 @@ def rollout(
         policy = {"form": name, "theta": policy_options.theta_of(name, theta, rrev, moment)}
     numbers = {"seed": seed, "stream": stream, "d_ceil_m": distance}
     data = chosen.fields(*bases)
-    for name in ("speed_mps", "angle_deg"):
-        if name not in data:
-            raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")
+    _check_approach(data)
     spec = yamlfile.validate(LandingSpec, {**data, **policy, **numbers}, "options")
     world, flight = spec.fly()
     seen = spec.film(world) if frames else None
@@ -125,6 +117,22 @@ def _shown(chosen: Chosen, policy_file: Path | None, run_folder: Path | None, **
     camera = chosen.given.get("sensing")
     quiet = [policy_file, run_folder, chosen.path, *said.values(), *map(chosen.given.get, ("speed_mps", "angle_deg"))]
     return camera is not None and all(value is None for value in quiet)
+
+
+def _check_files(trace: Path | None, plot: Path | None, frames: Path | None) -> None:
+    """Refuse files whose kind is unknown, before anything is flown."""
+    if trace:
+        tracefile.check_suffix(trace)
+    if plot and plot.suffix not in (".png", ".svg", ".pdf"):
+        raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
+    if frames:
+        video.check_suffix(frames)
+
+
+def _check_approach(data: dict[str, Any]) -> None:
+    for name in ("speed_mps", "angle_deg"):
+        if name not in data:
+            raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")
 
 
 def _of_run(folder: Path) -> LandingSpec:
