@@ -134,7 +134,7 @@ $(STM32:%=firmware-%): firmware-%: cross-toolchain
 	@+$(CROSS) FLAVOUR=$* programs
 
 .PHONY: pil
-pil: setup-dev build firmware $(STM32:%=pil-unity-%) ## unit tests, replay and landings on an emulated STM32F405
+pil: setup-dev build firmware pil-unity-stm32-Os ## unit tests, replay and landings on an emulated STM32F405
 	@+$(CROSS) layout
 	$(say) 'pil: pytest tests/stm32'
 	@$(BIN)/python -m pytest tests/stm32 $(PYTEST_ARGS)
@@ -145,7 +145,7 @@ $(STM32:%=pil-unity-%): pil-unity-%: firmware-% $(UNITY)/unity.c
 	@+$(CROSS) FLAVOUR=$* check
 
 .PHONY: pil-long
-pil-long: setup-dev build firmware $(UNITY)/unity.c ## a million recorded ticks of each build compared, ten million fuzzed (2 min)
+pil-long: setup-dev build firmware $(STM32:%=pil-unity-%) ## unit tests of each build, a million recorded ticks of each compared, ten million fuzzed (4 min)
 	$(say) 'pil-long: replay'
 	@$(BIN)/python tools/stm32/replay.py --ticks 1000000 $(STM32:%=build/%/replay.elf)
 	$(say) 'pil-long: fuzz'
@@ -168,18 +168,23 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 
 ##@ Tests
 
-# Two at a time: the first compile while pip waits for its downloads, then the longest come first.  Stages that compile into one folder are
-# ordered by their prerequisites.  test-wire flies in real time and has the machine for itself.
-TESTS := setup-dev test-c golden lint test-py pil test-links san test-mutants test-mujoco test-sil test-sweep test-report test-forms test-analysis \
-         test-flight test-vision test-physics sizes-diff docs notebook
+# Three at a time, since links and browsers wait a lot: the first compile while pip waits for its downloads, then the longest come first.  Stages
+# that compile into one folder are ordered by their prerequisites.  test-wire flies in real time, beside stages of one process each.
+TESTS := setup-dev test-c golden lint test-py pil test-links san test-mutants test-mujoco test-sil test-sweep test-report test-forms \
+         sizes-diff test-analysis test-flight test-vision
+QUIET := docs notebook test-physics
 
 .PHONY: test
 test: ## everything below, set-up and compilers included
 	@tools/apt_install.sh $(TOOLCHAIN) $(CPP) $(CROSS_TOOLCHAIN) $(VISION_TOOLCHAIN) $(FUZZER) $(QT_LIBRARIES) $(CHROMIUM) $(OPENSCAD)
-	$(say) 'test: two at a time, each printed when it is over'
-	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 $(TESTS)
-	@+$(MAKE) --no-print-directory test-wire
+	$(say) 'test: three at a time, each printed when it is over'
+	@+$(MAKE) --no-print-directory -j3 -Otarget SIDE_BY_SIDE=1 $(TESTS)
+	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 test-wire test-quiet
 	$(say) 'test: everything passed'
+
+.PHONY: test-quiet
+test-quiet: ## stages of one process each, one after the other
+	@+for stage in $(QUIET); do $(MAKE) --no-print-directory -Onone $$stage || exit 1; done
 
 .PHONY: test-c
 test-c: toolchain build $(UNITY)/unity.c example-cpp ## unit tests of firmware core and simulator (Unity), and the examples in C and C++

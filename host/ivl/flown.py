@@ -6,6 +6,7 @@
 The recorder knows pose, rates, force, thrusts and phase. Where legs are drawn, they are drawn as they stand in flight.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,8 @@ import numpy.typing as npt
 
 from ivl import landing, recordings
 from ivl.analysis.intervals import wilson
+from ivl.belief import recording
+from ivl.belief.recording import with_battery
 from ivl.experiment import Experiment
 from ivl.export.flight import Flight, of_file
 from ivl.landing import LandingSpec
@@ -23,6 +26,7 @@ from ivl.learning.recorder import SCORED, RolloutRows
 from ivl.links.forecast import Forecast, Forecasts
 from ivl.outcome import four_leg
 from ivl.table import Rows
+from ivl.task import settings_of
 from ivl.world import Trace, World, rotation
 
 FloatArray = npt.NDArray[np.float64]
@@ -62,20 +66,50 @@ def landings(folder: Path, experiment: Experiment, world: World, rollouts: Rollo
     found = []
     for row in np.flatnonzero(rollouts.status == SCORED).tolist():
         spec, path = counterpart(folder, experiment, rollouts, row)
-        _, simulated = spec.fly(world)
+        battery_V = rest_V(world, experiment, rollouts, row)
+        _, simulated = spec.fly(with_battery(world, battery_V) if math.isfinite(battery_V) else world)
         recorded = None
         if path.is_file() and rollouts.outcomes["triggered"][row]:
             recorded = as_trace(of_file(path, world), world, rollouts.outcomes[row], simulated)
-        forecast = forecasts.of(tuple(spec.theta))
+        forecast = forecasts.of(tuple(spec.theta), battery_V)
         found.append(FlownLanding(row, row + 1, spec, path, recorded, simulated, forecast))
     return found
 
 
 def counterpart(folder: Path, experiment: Experiment, rollouts: RolloutRows, row: int) -> tuple[LandingSpec, Path]:
-    """What the simulated counterpart of a rollout flies, and where the recording of the rollout is."""
+    """What the simulated counterpart of a flown rollout flies, and where the recording of the rollout is.
+
+    It has the battery that was on board, where that is known.
+    """
     trial, stream = int(rollouts.trial[row]), int(rollouts.stream[row])
     spec = landing.of_rollout(experiment, trial, rollouts.theta[row].tolist(), stream)
-    return spec, recordings.path_of(folder, spec.seed, stream)
+    path = recordings.path_of(folder, spec.seed, stream)
+    battery_V = rest_V(experiment.make_world(), experiment, rollouts, row)
+    if not math.isfinite(battery_V):
+        return spec, path
+    own = settings_of({"battery.voltage": battery_V, "battery.voltage_scatter": 0.0}, "the battery that was on board")
+    return spec.model_copy(update={"overrides": {**spec.overrides, **own}}), path
+
+
+def rest_V(world: World, experiment: Experiment, rollouts: RolloutRows, row: int) -> float:
+    """Voltage at rest of the battery that a flown rollout had; NaN: its recording does not tell, or it never sags."""
+    if rollouts.recordings is None:
+        return math.nan
+    in_hover_V = float(rollouts.recordings[row, recording.CONDITIONS[0]])
+    return recording.rest_V(world, experiment.flight, in_hover_V)
+
+
+def with_flown_batteries(world: World, experiment: Experiment, rollouts: RolloutRows) -> World:
+    """A world whose batteries scatter as those did that were on board in a run; the world itself if nobody knows.
+
+    What a simulator says of a policy that was flown, it says for them.
+    """
+    flown = np.flatnonzero(rollouts.status == SCORED).tolist()
+    known_V = np.array([rest_V(world, experiment, rollouts, row) for row in flown])
+    known_V = known_V[np.isfinite(known_V)]
+    if not known_V.size:
+        return world
+    return world.changed(**{"battery.voltage": float(known_V.mean()), "battery.voltage_scatter": float(known_V.std())})
 
 
 def as_trace(flight: Flight, world: World, outcome: Any, simulated: Trace) -> Trace:

@@ -141,6 +141,8 @@ def run(
         LinkError: The vehicle at the end of the link cannot be reached.
     """
     hooks = hooks or Hooks()
+    if resume and uri is None and (folder / "manifest.json").exists():
+        sessions.refuse_without_link(folder, read_manifest(folder))
     worlds = chosen.trial_worlds(n_trials or 1)
     packed, copies = references.pack(chosen)
     each = n_trials is not None and chosen.family.is_each
@@ -182,7 +184,9 @@ def run(
         learning = LearningRun(trials_of(chosen, n_trials or 1), source, store, simulator, told, n_thinking)
         learning.run(hooks.on_episode)
         source.close()
-        flown = _Flown(chosen, worlds, each, store.episodes(), store.rollouts(), threads)
+        rollouts = store.rollouts()
+        judging = [flown_landings.with_flown_batteries(worlds[0], chosen, rollouts)] if source.is_flown else worlds
+        flown = _Flown(chosen, judging, each, store.episodes(), rollouts, threads)
         bests, verdicts, summary = _judge(flown, folder, n_trials, hooks)
         if source.is_flown:
             found = flown_landings.landings(folder, chosen, worlds[0], flown.rollouts)

@@ -42,6 +42,17 @@ def go_on(old: Mapping[str, Any], session: Mapping[str, Any]) -> tuple[dict[str,
     return {**old, "sessions": [*old["sessions"], dict(session)]}, told
 
 
+def refuse_without_link(folder: object, old: Mapping[str, Any]) -> None:
+    """Refuse to go on in the simulator where a vehicle has flown; before anything that takes long.
+
+    Raises:
+        StoreError: A vehicle has flown, and none is named.
+    """
+    if old.get("flown"):
+        words = "--rehearse" if old.get("rehearsed") else "--uri site"
+        raise StoreError(f"{folder}: cannot be resumed without its vehicle: add {words}")
+
+
 def refuse_other_kind(folder: object, old: Mapping[str, Any], new: Mapping[str, Any]) -> None:
     """Refuse to go on with a drone where a day was rehearsed, or in a simulator where a vehicle flew; and conversely.
 

@@ -1,5 +1,6 @@
 """Where rollouts come from: the loop asks a `RolloutSource` and does not know whether it simulates or flies."""
 
+import math
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -74,6 +75,14 @@ class RolloutSource(Protocol):
         """
         ...
 
+    def battery_V(self) -> float:
+        """Voltage expected in the hover of the next rollout, whatever its policy; NaN: nobody knows.
+
+        Raises:
+            RolloutError: The source cannot go on.
+        """
+        ...
+
     def close(self) -> None:
         """Give back what the source holds when no more is to be flown; calling it again does nothing."""
         ...
@@ -112,6 +121,10 @@ class WorldSource:
         flown = zip(plan.theta, plan.seed.tolist(), plan.stream.tolist(), strict=True)
         return np.array([simulated(self.world, flight, theta, seed, stream)[0] for theta, seed, stream in flown])
 
+    def battery_V(self) -> float:
+        """Nothing that lasts: each rollout has a battery of its own."""
+        return math.nan
+
     def close(self) -> None:
         """Nothing to give back."""
 
@@ -142,6 +155,10 @@ class TrialSource:
         assert plan.trial is not None
         source = self._sources[int(plan.trial[own[0]])]
         return list(source.fly(Plan(plan.theta[own], plan.seed[own], plan.stream[own])))
+
+    def battery_V(self) -> float:
+        """Nothing that lasts: each rollout has a battery of its own."""
+        return math.nan
 
     def close(self) -> None:
         """Nothing to give back."""

@@ -191,7 +191,14 @@ static void judge_estimate(ivl_cf_t *cf)
     cf->variance_m2 = told_m * told_m;
 }
 
-/// Voltage that a parameter says, at this thrust; 0: none does.
+/// Whether the cell of the parameters drives the motors; those of a supply that never sags do not weaken.
+static bool drives_motors(const ivl_cf_t *cf)
+{
+    return cf->set.sim.cell_V > 0.0f && cf->model.raw.battery_voltage_V > 0.0;
+}
+
+/// Voltage that a parameter says, at this commanded thrust; 0: none does.  A cell that drives the motors sags with what they take, which is
+/// more than was commanded where the cell is strong.
 static float told_V(const ivl_cf_t *cf, float thrust_N)
 {
     const float                empty_V = 0.01f;
@@ -200,7 +207,8 @@ static float told_V(const ivl_cf_t *cf, float thrust_N)
     {
         return set->vbat_V;
     }
-    const float loaded_V = set->cell_V - (float)cf->model.raw.battery_sag_VpN * thrust_N;
+    const float loaded_V = drives_motors(cf) ? (float)ivl_sim_rotor_voltage(&cf->model, &cf->group.rotor, IVL_CF_LANE)
+                                             : set->cell_V - (float)cf->model.raw.battery_sag_VpN * thrust_N;
     return (loaded_V > empty_V) ? loaded_V : empty_V;
 }
 
@@ -208,7 +216,7 @@ static void draw_power(ivl_cf_t *cf)
 {
     const float weight_N = cf->model.firmware.mass_kg * cf->model.firmware.gravity_mps2;
     const float thrust_N = cf->motor_N[0] + cf->motor_N[1] + cf->motor_N[2] + cf->motor_N[3];
-    if (cf->set.sim.cell_V > 0.0f && cf->model.raw.battery_voltage_V > 0.0)  // motors of a supply that never sags do not weaken
+    if (drives_motors(cf))
     {
         cf->group.rotor.open_circuit_V[IVL_CF_LANE] = (double)cf->set.sim.cell_V;
     }

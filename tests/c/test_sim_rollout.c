@@ -227,13 +227,13 @@ static void test_what_is_called_missed_would_never_have_touched_even_with_rotors
     const ivl_sim_model_t model = fixture_model(&params);
     draws_t               draws = {12};
     int                   missed = 0;
-    for (int i = 0; i < 400; i++)
+    for (int i = 0; i < CASES(400); i++)
     {
         const ivl_sim_spec_t spec = spec_of(draw(&draws, 0.5, 3.0), draw(&draws, 30.0, 90.0), draw(&draws, 1.5, 4.5),
                                             draw(&draws, 2.0, 10.0), IVL_SIM_START_IMPARTED);
         check_missed(&model, &spec, &missed);
     }
-    TEST_ASSERT_GREATER_THAN(100, missed);
+    TEST_ASSERT_GREATER_THAN(CASES(100), missed);
 }
 
 // ---- specs that are none -----------------------------------------------------------------------------------------------

@@ -340,7 +340,7 @@ static void test_motion_from_any_state_at_all_takes_no_more_evaluations_than_it_
     const double adhesion[] = {(double)INFINITY, 0.0, 0.1}, delay[] = {0.0, 0.01};
     draws_t      draws = {34};
     int          gave_up = 0;
-    for (int i = 0; i < 100; i++)
+    for (int i = 0; i < CASES(100); i++)
     {
         ivl_sim_params_t params = draw_legs(&draws);
         params.leg_adhesion_N = adhesion[i % 3];

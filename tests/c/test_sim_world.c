@@ -306,8 +306,8 @@ static void test_energy_is_not_pumped_when_a_plate_hits_the_ceiling_or_when_all_
         params.body_inertia_yy_kgm2 = inertia[i / 3][1];
         params.body_inertia_zz_kgm2 = inertia[i / 3][2];
         const ivl_sim_model_t model = fixture_model(&params);
-        TEST_ASSERT_LESS_THAN_DOUBLE(0.02, largest_rise(&model, &draws, 1.0, 2.0, 250));  // plates first
-        TEST_ASSERT_LESS_THAN_DOUBLE(0.02, largest_rise(&model, &draws, 2.9, 3.4, 250));  // all four feet
+        TEST_ASSERT_LESS_THAN_DOUBLE(0.02, largest_rise(&model, &draws, 1.0, 2.0, CASES(250)));  // plates first
+        TEST_ASSERT_LESS_THAN_DOUBLE(0.02, largest_rise(&model, &draws, 2.9, 3.4, CASES(250)));  // all four feet
     }
 }
 

@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from rehearsed import BUDGET, Days
 
 from ivl import cli, flown, native, report, run
+from ivl.belief import recording
 from ivl.errors import ConfigError
 from ivl.export.source import Choice, resolve
 from ivl.flight import table
@@ -19,6 +21,7 @@ from ivl.learning.earlier import meta_of
 from ivl.learning.recorder import DISCARDED, SCORED
 from ivl.outcome import four_leg
 from ivl.seeds import Purpose, derive
+from ivl.site import file as site_file
 from ivl.store import RunStore
 
 COLUMNS = {
@@ -82,6 +85,35 @@ def test_the_summary_has_the_flown_rate_with_its_interval(days: Days) -> None:
     assert told["landed"] == int(four_leg(rollouts.outcomes).sum())
     assert told["rate_lo"] < told["rate"] < told["rate_hi"]
     assert 0.0 < told["pitch_rms_deg_median"] < 30.0, "the simulator flew both, with other noise and battery"
+
+
+def test_counterparts_and_judge_have_the_batteries_that_were_on_board(days: Days) -> None:
+    assert days.result is not None
+    world, rollouts = days.chosen.make_world(), days.rollouts()
+    assert rollouts.recordings is not None
+    flew_V = np.array([flown.rest_V(world, days.chosen, rollouts, row) for row in range(len(rollouts))])
+    assert days.chosen.site is not None
+    battery = site_file.load(days.chosen.site).battery
+    assert np.nanmax(flew_V) < battery.full_V + 0.03
+    assert np.nanmin(flew_V) > battery.rest_V_min - 0.1, "a flight takes some of it"
+    told = np.full((len(rollouts), recording.N), np.nan)
+    unknown = replace(rollouts, recordings=told.copy())
+    assert flown.with_flown_batteries(world, days.chosen, unknown) is world
+    rest_V = np.where(np.arange(len(rollouts)) % 2 == 0, 3.7, 4.1)
+    in_hover_V = [recording.hover_V(world, days.chosen.flight, volts) for volts in rest_V]
+    told[:, recording.CONDITIONS[0]] = in_hover_V
+    known = replace(rollouts, recordings=told)
+    assert [flown.rest_V(world, days.chosen, known, row) for row in range(len(known))] == pytest.approx(rest_V.tolist())
+    row = triggered(days)
+    spec, _ = flown.counterpart(days.folder, days.chosen, known, row)
+    assert spec.overrides["battery.voltage"].value == pytest.approx(rest_V[row])
+    found = flown.landings(days.folder, days.chosen, world, known)
+    (own,) = (each for each in found if each.row == row)
+    assert np.array_equal(own.simulated.rows["p_WB_m"], spec.fly()[1].rows["p_WB_m"]), "the page and a replay agree"
+    scattered = flown.with_flown_batteries(world, days.chosen, known).params.values
+    scored = rest_V[rollouts.status == SCORED]
+    assert scattered["battery.voltage"] == pytest.approx(scored.mean())
+    assert scattered["battery.voltage_scatter"] == pytest.approx(scored.std())
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from ivl import experiment, forms, native, run
+from ivl.belief import recording
 from ivl.errors import ConfigError, LinkError, RolloutError, StoreError
 from ivl.experiment import Experiment
 from ivl.links import preflight, sil
@@ -170,6 +171,27 @@ def test_operator_is_asked_for_a_battery_until_it_is_good(
     source.fly_one(GOOD)
     assert script.asked[0] == "place"
     assert [line.split()[0] for line in script.asked] == ["place", "battery", "battery", "confirm"]
+
+
+@pytest.mark.parametrize("link_is_lost", [False, True])
+def test_battery_is_known_and_changed_before_a_policy_is_chosen(
+    source: CrazyflieSource, script: Script, server: SilProcess, link_is_lost: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def change() -> None:
+        if link_is_lost:  # as when the vehicle is without power meanwhile
+            server.kill()
+            server.start()
+        server.set("sil.vbat", 4.0)
+
+    source.world = source.world.changed(**{"battery.voltage": 4.0})
+    server.set("sil.vbat", 3.6)
+    vehicle_of(source).wait(lambda: vehicle_of(source).battery_V < 3.65, 2.0, "voltage", 0.05)
+    script.on_battery = change
+    known_V = source.battery_V()
+    assert script.asked == ["battery 3.6"]
+    assert np.isnan(known_V), "without a rehearsed day that battery drives no motors"
+    monkeypatch.setattr(type(source._site), "_battery_V", Room._battery_V)
+    assert source.battery_V() == recording.hover_V(source.world, source._experiment.flight, 4.0)
 
 
 def test_vehicle_that_aborts_for_its_surroundings_is_not_scored(
@@ -465,6 +487,8 @@ def test_a_run_goes_on_over_another_link_with_another_vehicle_and_says_so(
         fly(second.uri, resume=True, rehearse=True)
         with pytest.raises(StoreError, match="it is flown in a room, and now would be not flown in a room"):
             fly(second.uri, resume=True, other_world=True)
+        with pytest.raises(StoreError, match="cannot be resumed without its vehicle: add --rehearse"):
+            run.run(chosen, tmp_path / "run", resume=True)
     assert f"the link was {first.uri}, and is {second.uri}" in notes
     assert any(note.startswith("the vehicle was 00515649") and note.endswith("2") for note in notes)
     assert script.asked.count("place") == 2

@@ -384,6 +384,41 @@ def test_the_next_flight_is_expected_with_the_battery_of_the_last_one_only_if_it
         assert np.array_equal(again.ask(), learner.ask())
 
 
+def test_a_battery_that_is_known_before_a_flight_is_decided_for(
+    simulator: Simulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    decided: list[float] = []
+    safest = decide.safest
+
+    def noted(belief: posterior.Belief, *others: Any) -> tuple[np.ndarray, float]:
+        decided.append(belief.battery_V)
+        return safest(belief, *others)
+
+    for lasts in (False, True):
+        chosen = replace(simulator, flight=replace(FLIGHT, battery_lasts=lasts))
+        learner, other = (learner_of(chosen, n_particles=32) for _ in range(2))
+        monkeypatch.setattr(decide, "safest", noted)
+        decided.clear()
+        for battery_V in (np.nan, 3.7, 3.7 + 0.9 * emulator.BATTERY_CHANGES_V, 3.5):
+            learner.take_battery(battery_V)
+        monkeypatch.setattr(decide, "safest", safest)
+        assert decided == ([3.7, 3.5] if lasts else [])
+        assert learner._rng.bit_generator.state == other._rng.bit_generator.state, "later numbers stay as they were"
+
+
+def test_the_hover_of_a_battery_is_as_simulated_flights_record_it() -> None:
+    flown = experiment.load("experiments/paper_flight.yaml")
+    world = flown.make_world()
+    for rest_V in (3.6, 3.9, 4.2):
+        own = world.changed(**{"battery.voltage": rest_V, "battery.voltage_scatter": 0.0})
+        features, _ = recording.simulated(own, flown.flight, np.array([4.5, 8.0]), seed=3, stream=0)
+        told = recording.hover_V(world, flown.flight, rest_V)
+        assert told == pytest.approx(features[recording.CONDITIONS[0]], abs=0.05)
+        assert told < rest_V
+    assert np.isnan(recording.hover_V(world, flown.flight, np.nan))
+    assert np.isnan(recording.hover_V(world.changed(**{"battery.voltage": 0.0}), flown.flight, 4.0))
+
+
 # ---- decision
 
 

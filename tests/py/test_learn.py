@@ -1,3 +1,4 @@
+import math
 import os
 import signal
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from ivl import experiment, native
 from ivl.errors import RolloutError
 from ivl.experiment import Experiment
 from ivl.layout import layout_of
+from ivl.learners import EpheBelief
 from ivl.learning.loop import LearningRun, Progress, recent_rate, trials_of
 from ivl.learning.recorder import EpisodeRow
 from ivl.source import Flown, Plan, WorldSource
@@ -61,6 +63,9 @@ class Portions:
             rows = order[first : first + self.size]
             yield Flown(rows, flown.outcomes[rows])
 
+    def battery_V(self) -> float:
+        return math.nan
+
 
 class Failing(Portions):
     """A source that breaks down after some portions."""
@@ -88,6 +93,19 @@ class Discarding(Portions):
         for flown in super().fly(plan):
             discarded = int(plan.stream[flown.index[0]]) % 4 in self.rejected
             yield Flown(flown.index, flown.outcomes, "wind" if discarded else "")
+
+
+def test_a_learner_with_a_belief_hears_of_the_battery_before_each_episode(
+    small: Experiment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard: list[float] = []
+    monkeypatch.setattr(EpheBelief, "take_battery", lambda _, battery_V: heard.append(battery_V))
+    monkeypatch.setattr(WorldSource, "battery_V", lambda _: 3.9)
+    chosen = small.learner.model_copy(update={"name": "ephe_belief", "options": {}})
+    believing = small.model_copy(update={"learner": chosen})
+    with create(tmp_path / "run") as store:
+        LearningRun(trials_of(believing, 2), WorldSource(small.make_world(), small), store).run()
+    assert heard == [3.9] * 8, "two trials, four episodes"
 
 
 def test_a_run_flies_its_budget_and_reports_every_episode(small: Experiment, tmp_path: Path) -> None:

@@ -369,7 +369,7 @@ def test_show_draws_the_surface(path: Path, suffix: str, capsys: Capture) -> Non
 
 def test_show_draws_all_pictures_into_a_folder(path: Path, capsys: Capture) -> None:
     folder = path.with_name("pictures")
-    assert cli.run(["policy", "show", str(path), "--plot", str(folder), "--approaches", "12", "--json"]) == 0
+    assert cli.run(["policy", "show", str(path), "--plot", str(folder), "--approaches", "4", "--json"]) == 0
     names = {f"{picture.name}{suffix}" for picture in pictures.PICTURES for suffix in (".png", ".pdf")}
     assert {file.name for file in folder.iterdir()} == names
     assert len(names) == 8

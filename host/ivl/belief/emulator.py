@@ -44,7 +44,7 @@ _ROWS_MAX = 1000
 _NETS, _HIDDEN, _EPOCHS, _PENALTY = 3, (48, 48, 24), 40, 0.3
 _BATCH, _RATE = 400, 1e-3
 
-_BATTERY_CHANGES_V = 0.03
+BATTERY_CHANGES_V = 0.03
 """From a flight to the next one with the same battery, as measured in the hover."""
 
 Rows = npt.NDArray[Any]
@@ -98,7 +98,7 @@ class Scale:
         spread = np.stack([ndtri(quantiles[:, 0]), np.sqrt(3.0) * (2.0 * quantiles[:, 1] - 1.0)], axis=1)
         mean, sigma = self.mean.copy(), self.sigma.copy()
         if np.isfinite(battery_V):
-            mean[0], sigma[0] = battery_V, min(_BATTERY_CHANGES_V, sigma[0])
+            mean[0], sigma[0] = battery_V, min(BATTERY_CHANGES_V, sigma[0])
         return np.asarray(np.where(self.sigma > 0.0, mean + sigma * spread, np.nan))
 
 

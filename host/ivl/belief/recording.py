@@ -17,6 +17,7 @@ gives them: late, and interpolated between its poses. What a flight does not hav
 contact, all of them without a trigger.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -121,6 +122,33 @@ def simulated(world: World, flight: Flight, theta: FloatArray, seed: int, stream
     rng = np.random.Generator(np.random.PCG64([seed, stream]))
     threshold_per_s = float(theta[0]) if flight.form == forms.PAPER else 0.0
     return of_trace(world, trace, threshold_per_s, rng), np.atleast_1d(np.asarray(trace.outcome)).view(np.recarray)
+
+
+def with_battery(world: World, rest_V: float) -> World:
+    """The world with one battery, in place of any of those of its vehicle."""
+    return world.changed(**{"battery.voltage": rest_V, "battery.voltage_scatter": 0.0})
+
+
+def hover_V(world: World, flight: Flight, rest_V: float) -> float:
+    """Voltage in the hover before an approach, of a battery that has `rest_V` at rest; NaN: it has no sag to know.
+
+    What a hover takes from it is simulated, so it does not wait for a first flight to tell.
+    """
+    if not (math.isfinite(rest_V) and world.params.values["battery.voltage"] > 0.0):
+        return math.nan
+    speed_mps, angle_deg, policy = flight.of(flight.box.mean(axis=1))
+    trace = with_battery(world, rest_V).trace(
+        speed_mps, angle_deg, *policy, form=flight.form, start=flight.start, period_s=_TRACE_PERIOD_S
+    )
+    return float(trace.rows["battery_V"][0])
+
+
+def rest_V(world: World, flight: Flight, in_hover_V: float) -> float:
+    """Voltage at rest of a battery that has `in_hover_V` in the hover; NaN as in `hover_V`.
+
+    What a hover takes is the same at any voltage: its thrust, and so its current, is the weight's.
+    """
+    return in_hover_V + (in_hover_V - hover_V(world, flight, in_hover_V))
 
 
 def of_trace(world: World, trace: Trace, threshold_per_s: float, rng: np.random.Generator) -> FloatArray:

@@ -89,10 +89,11 @@ def _of_learn(folder: Path, choice: Choice) -> Flight:
     row = int(scored[np.argmax(rollouts.reward[scored])]) if choice.rollout is None else choice.rollout
     if row >= len(rollouts):
         raise ConfigError(f"--rollout {row}: trial {trial} of {folder} has rollouts 0 .. {len(rollouts) - 1}")
-    spec, path = flown.counterpart(folder, experiment, rollouts, row)
     title = f"{experiment.name}, trial {trial}, rollout {row}"
     if not is_flown:
+        spec = landing.of_rollout(experiment, trial, rollouts.theta[row].tolist(), int(rollouts.stream[row]))
         return of_spec(spec, title, experiment.reward)
+    spec, path = flown.counterpart(folder, experiment, rollouts, row)
     if choice.simulated:
         return of_spec(spec, f"{title}, SIMULATED counterpart of a flown landing", experiment.reward)
     if not path.is_file():

@@ -14,6 +14,7 @@ and while the surprise is below `alarm` it says that no member fits and trusts o
 `wide` times as large. Without a simulator it is EPHE with a memory (`ivl.learners.ephe_memory`).
 """
 
+import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -163,6 +164,22 @@ class EpheBelief(EpheMemory):
         """Voltage of the last flight that told one, if the next has the same battery; else NaN."""
         told = self._conditions[np.isfinite(self._conditions[:, 0]), 0]
         return float(told[-1]) if self._simulator.flight.battery_lasts and len(told) else np.nan
+
+    def take_battery(self, battery_V: float) -> None:
+        """Decide again for the battery of the next flight, if it is none that flights have told of.
+
+        The random numbers are a copy, so later ones are as without it.
+
+        Args:
+            battery_V: Voltage that is expected in the hover; NaN is unknown.
+        """
+        if self._belief is None or not self._simulator.flight.battery_lasts or not np.isfinite(battery_V):
+            return
+        if abs(battery_V - self._belief.battery_V) <= emulator.BATTERY_CHANGES_V:
+            return
+        self._belief.battery_V = battery_V
+        rng = copy.deepcopy(self._rng)
+        self._choice, self._margin_rate = decide.safest(self._belief, self._corrected, self._bounds, rng)
 
     def _rates_flown(self, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """Landing rates that the belief, uncorrected, expects of flights; if a battery lasts, each with its own."""

@@ -5,6 +5,7 @@ others, or in two halves with a `kill -9` between them, and whatever records it:
 recorder before the learners are told.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -138,6 +139,11 @@ class LearningRun:
 
     def _plan(self, episode: int, active: list[int]) -> None:
         n = self._first.n_rollouts
+        battery_V = self._source.battery_V() if self._source is not None else math.nan
+        for trial in active:
+            learner = self._learners[trial]
+            if isinstance(learner, EpheBelief):
+                learner.take_battery(battery_V)
         theta = [self._learners[trial].ask() for trial in active]
         stream = np.arange(episode * n, (episode + 1) * n, dtype=np.uint64)
         self._recorder.plan(episode, active, stream, theta, self._states(active))

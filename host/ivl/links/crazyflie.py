@@ -7,6 +7,7 @@ again: nothing is scored wrongly, and nothing is lost.
 All that depends on where is flown is the business of a site (`ivl.links.sites`).
 """
 
+import math
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -119,6 +120,29 @@ class CrazyflieSource:
         for i in range(len(plan.theta)):
             rollout = Rollout(tuple(plan.theta[i].tolist()), int(plan.seed[i]), int(plan.stream[i]))
             yield self._fly_until_known(np.array([i], dtype=np.intp), rollout)
+
+    def battery_V(self) -> float:
+        """Voltage expected in the hover of the next flight, from that at rest; and of another battery if this is low.
+
+        A vehicle that cannot be asked is none of this method's business: the flight meets the trouble again, and there
+        it is told and counted.
+
+        Raises:
+            RolloutError: The operator stopped.
+        """
+        for _ in range(2):  # a change of battery takes the link
+            try:
+                if self._vehicle is None:
+                    self._return()
+                assert self._site is not None
+                return recording.hover_V(self.world, self._experiment.flight, self._site.rest_V())
+            except VehicleAway:
+                return math.nan
+            except (FlyingEnds, OtherForms):
+                raise
+            except (LinkError, RolloutError):
+                self._drop()
+        return math.nan
 
     def close(self) -> None:
         """Bring the vehicle down, disarm it and close the link; safe to call at any time, and again."""

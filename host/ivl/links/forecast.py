@@ -1,9 +1,11 @@
 """What the simulator in this process expects of a policy that is announced to an operator."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from ivl.belief.recording import with_battery
 from ivl.experiment import Experiment
 from ivl.outcome import four_leg
 from ivl.world import World
@@ -34,17 +36,21 @@ class Forecasts:
     def __init__(self, world: World, experiment: Experiment) -> None:
         """Nothing is simulated yet."""
         self._world, self._experiment = world, experiment
-        self._last: tuple[tuple[float, ...], Forecast] | None = None
+        self._last: tuple[tuple[tuple[float, ...], float | None], Forecast] | None = None
 
-    def of(self, theta: tuple[float, ...]) -> Forecast:
-        """Of a policy, in the units of the experiment's form."""
-        if self._last is None or self._last[0] != theta:
-            self._last = theta, self._simulated(theta)
+    def of(self, theta: tuple[float, ...], rest_V: float = math.nan) -> Forecast:
+        """Of a policy, in the units of the experiment's form, with a battery that has `rest_V` at rest; NaN: any."""
+        told = math.isfinite(rest_V) and self._world.params.values["battery.voltage"] > 0.0
+        battery_V = round(rest_V, 2) if told else None
+        if self._last is None or self._last[0] != (theta, battery_V):
+            self._last = (theta, battery_V), self._simulated(theta, battery_V)
         return self._last[1]
 
-    def _simulated(self, theta: tuple[float, ...]) -> Forecast:
-        experiment = self._experiment
-        out = self._world.rollouts(
+    def _simulated(self, theta: tuple[float, ...], battery_V: float | None) -> Forecast:
+        experiment, world = self._experiment, self._world
+        if battery_V is not None:
+            world = with_battery(world, battery_V)
+        out = world.rollouts(
             experiment.speed_mps, experiment.angle_deg, *theta, form=experiment.policy.form,
             seed=_SEED, stream=np.arange(N, dtype=np.uint64), start=experiment.start,
         )  # fmt: skip

@@ -5,6 +5,7 @@ tick is one exchange over its standard input and output. Every worker thread has
 """
 
 import ctypes
+import math
 import os
 import shutil
 import time
@@ -134,6 +135,10 @@ class PilSource:
         for flown in self._source.fly(plan):
             self.chips.check()
             yield flown
+
+    def battery_V(self) -> float:
+        """Nothing that lasts: each rollout has a battery of its own."""
+        return math.nan
 
     def close(self) -> None:
         """The chips end with the world that they fly."""

@@ -35,7 +35,7 @@ class LogBlock:
 
     names: tuple[str, ...]
     period_ms: int
-    values: Mapping[str, float] = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)
     seen_s: float = float("-inf")
 
 

@@ -541,6 +541,16 @@ class Vehicle:
         """Voltage of the battery, NaN if it is not known yet."""
         return float(self.watch.values.get("pm.vbat", float("nan")))
 
+    def hear_battery(self, limit_s: float) -> None:
+        """Another battery may be in place: forget the voltage, and wait until the vehicle tells it again.
+
+        Raises:
+            Trouble: It did not within `limit_s` of vehicle time.
+            LinkError: The vehicle fell silent; a change of battery takes its power.
+        """
+        self.watch.values.pop("pm.vbat", None)
+        self.wait(lambda: self.battery_V > 0.0, limit_s, "the battery's voltage")
+
     @property
     def position_W_m(self) -> tuple[float, float, float]:
         """Estimated position, NaN if it is not known yet."""

@@ -4,6 +4,7 @@ A trial depends on its own name alone. It comes out bit for bit the same beside 
 `ivl learn` with its seed: both are the loop of `ivl.learning`, here recorded in arrays.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -132,6 +133,10 @@ class Approaches:
             start=self._start,
             threads=1,
         )
+
+    def battery_V(self) -> float:
+        """Nothing that lasts: each rollout has a battery of its own."""
+        return math.nan
 
     def close(self) -> None:
         """Nothing to give back."""

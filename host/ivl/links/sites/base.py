@@ -99,6 +99,10 @@ class Site(Protocol):
         """Bring the vehicle down and leave it as it was found; a failure is reported, not raised."""
         ...
 
+    def rest_V(self) -> float:
+        """Voltage at rest of the battery for the next flight; one that is too empty is changed. NaN: nobody knows."""
+        ...
+
     # ---- a landing
 
     def to_start(self, rollout: Rollout) -> Point:

@@ -71,6 +71,10 @@ class Rehearsal(Room):
         if self._day is not None:
             self._day.hovers()
 
+    def _battery_V(self) -> float:
+        """As the base on a rehearsed day; else the battery that a software vehicle tells of drives no motors."""
+        return math.nan if self._day is None else super()._battery_V()
+
     def rotor_V(self, landing: Landing) -> float:
         """As the base on a rehearsed day; else the battery that a software vehicle tells of drives no motors."""
         return math.nan if self._day is None else super().rotor_V(landing)

@@ -46,6 +46,7 @@ _LOOK_S = 0.02
 _TURNED = (Phase.COAST, Phase.ATTACHED, Phase.DONE)
 """Phases after a flip, which the recorder has: nobody needs to look how near the vehicle came."""
 _SETTLE_S, _IDLE_S, _ARM_S, _END_S = 1.0, 3.0, 8.0, 30.0
+_VOLTAGE_S = 10.0
 
 
 class Room:
@@ -120,6 +121,19 @@ class Room:
     def _come_down(self) -> None:
         self._say(f"vehicle: {safe_or_why(self._vehicle, self._room.emergency_m)}")
 
+    def rest_V(self) -> float:
+        """Ask for another battery until one is good; a vehicle without power is a lost link, which the caller sees."""
+        vehicle, needed_V = self._vehicle, self._room.battery.rest_V_min
+        while not vehicle.battery_V >= needed_V:
+            self._operator.change_battery(vehicle.battery_V, needed_V)
+            vehicle.pause(0.5)  # what was sent before is not what the new battery says
+            vehicle.hear_battery(_VOLTAGE_S)
+        return self._battery_V()
+
+    def _battery_V(self) -> float:
+        """Voltage at rest, now, of the battery that drives the motors; NaN: nobody knows."""
+        return self._vehicle.battery_V
+
     # ---- recovery
 
     def after_refusal(self) -> None:
@@ -166,7 +180,7 @@ class Room:
         form = experiment.policy.shape
         return Upcoming(
             rollout.stream + 1, experiment.budget, form, rollout.theta, experiment.policy.bounds,
-            self._visit.forecasts.of(rollout.theta),
+            self._visit.forecasts.of(rollout.theta, self._battery_V()),
             self._start_W_m, self._room.home_m,
         )  # fmt: skip
 
@@ -179,14 +193,10 @@ class Room:
             raise trouble
 
     def _check_gate(self) -> None:
-        """Ask for another battery until one is good; a vehicle without power is a lost link, which the caller sees."""
-        vehicle = self._vehicle
+        """The cameras see the vehicle, and its battery is good."""
         if self._tracking is not None and (problems := self._tracking.problems()):
             raise Trouble(Cause.TRACKING, "; ".join(problems))
-        needed_V = self._room.battery.rest_V_min
-        while not vehicle.battery_V >= needed_V:
-            self._operator.change_battery(vehicle.battery_V, needed_V)
-            vehicle.pause(0.5)
+        self.rest_V()
 
     def _check_home(self) -> None:
         """Refuse a vehicle that is not where the site has its home: then frames or heights are not as they say."""

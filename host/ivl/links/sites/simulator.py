@@ -1,5 +1,6 @@
 """The simulator of a software vehicle: reset into the air, start and outcome as the simulator has them."""
 
+import math
 from collections.abc import Callable, Iterator
 
 from ivl.check import Check
@@ -125,6 +126,10 @@ class Simulator:
 
     def end_flight(self) -> None:
         """Do nothing."""
+
+    def rest_V(self) -> float:
+        """Nothing that lasts: each landing has a battery of its own."""
+        return math.nan
 
     def rotor_V(self, landing: Landing) -> float:
         """That of the world's battery, which is another one than that of the vehicle's power management."""
