@@ -90,11 +90,13 @@ class Parameters:
         values: Value of each parameter, in table order.
         origin: Where each value comes from: a file's label, "default" or "override".
         sigma: Standard deviation of each value that a file gives with one and that no override replaces.
+        texture: Surface that a rendered camera looks at, None without one.
     """
 
     values: Mapping[str, float]
     origin: Mapping[str, str]
     sigma: Mapping[str, float]
+    texture: str | None = None
 
     def vector(self) -> npt.NDArray[np.float64]:
         """The values as the library takes them, shape (n_params,)."""
@@ -103,6 +105,8 @@ class Parameters:
     def digest(self) -> str:
         """SHA-256 over names and exact values: equal digests mean equal worlds."""
         text = "\n".join(f"{name}={value.hex()}" for name, value in self.values.items())
+        if self.texture is not None:
+            text += f"\ntexture={self.texture}"
         return hashlib.sha256(text.encode()).hexdigest()
 
 

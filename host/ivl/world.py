@@ -11,7 +11,7 @@ on one thread or many.
 import math
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -164,8 +164,7 @@ class World:
         self.overrides = dict(overrides)
         parts = _parts(vehicle, gear, gear_set, sensing)
         params = model.assemble(parts, overrides)
-        self.texture = _texture_of(params, parts[-1], texture)
-        self._build(params)
+        self._build(replace(params, texture=_texture_of(params, parts[-1], texture)))
 
     def _build(self, params: model.Parameters) -> None:
         self.params = params
@@ -175,14 +174,14 @@ class World:
         except NativeError as error:
             raise NativeError(f"vehicle {self.vehicle}, gear {self.gear_set}/{self.gear}: {error}") from error
         if params.values["camera.rate"] > 0.0:
-            if self.texture is None:
+            if params.texture is None:
                 raise ConfigError("camera.rate: a camera needs a surface to look at: give a texture")
-            self._native.give_camera(textures.make(self.texture, params.values["camera.texture_length"]))
+            self._native.give_camera(textures.make(params.texture, params.values["camera.texture_length"]))
         self.surface = Surface.of(self._native)
 
     def __getstate__(self) -> dict[str, Any]:
         """What pickling carries: the checked parameters, never the files' names alone nor the native handle."""
-        names = ("vehicle", "gear", "gear_set", "sensing", "texture", "overrides", "params")
+        names = ("vehicle", "gear", "gear_set", "sensing", "overrides", "params")
         return {name: getattr(self, name) for name in names}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -214,8 +213,13 @@ class World:
         world.__dict__.update({k: v for k, v in self.__dict__.items() if k not in ("params", "surface", "_native")})
         world.overrides = {**self.overrides, **overrides}
         sigma = {name: value for name, value in self.params.sigma.items() if name not in overrides}
-        world._build(model.Parameters(values, origin, sigma))
+        world._build(model.Parameters(values, origin, sigma, self.params.texture))
         return world
+
+    @property
+    def texture(self) -> str | None:
+        """Surface that a rendered camera looks at, None without one."""
+        return self.params.texture
 
     @property
     def native_model(self) -> native.NativeModel:

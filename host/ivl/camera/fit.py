@@ -95,7 +95,8 @@ def of_films(films: list[Film]) -> Errors:
         )
         for column, row in zip(columns, rows, strict=True):
             column.append(np.asarray(row[1:]))
-    return Errors(*(np.concatenate(column) if column else np.empty(0) for column in columns))
+    whole: list[Any] = [np.concatenate(column) if column else np.empty(0) for column in columns]
+    return Errors(*whole)
 
 
 def approaches(world: World, n: int, seed: int) -> list[Film]:
