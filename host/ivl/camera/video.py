@@ -5,7 +5,6 @@ MP4 goes through the encoder that the package imageio-ffmpeg brings along; GIF t
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -160,18 +159,3 @@ def _curve(draw: ImageDraw.ImageDraw, film: Film, i: int, curve: Truth) -> None:
             x, y = place(float(sampled[k]), float(rrev[k]))
             draw.ellipse((x - 2, y - 2, x + 2, y + 2), fill=_GREEN)
     draw.text((left + 4, top + 2), f"RREV, 0 to {_RREV_MAX_PER_S:g} 1/s", fill=_INK)
-
-
-def read_size(path: Path) -> tuple[int, int, int]:
-    """Number of frames of a video, its width and its height.
-
-    Raises:
-        ConfigError: It cannot be read.
-        MissingError: The decoder is not installed.
-    """
-    reader: Any = needed("imageio_ffmpeg", "video").read_frames(str(path))
-    try:
-        width, height = next(reader)["size"]
-        return sum(1 for _ in reader), width, height
-    except (OSError, RuntimeError) as error:
-        raise ConfigError(f"{path}: no video ({error})") from error
