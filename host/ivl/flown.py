@@ -99,17 +99,19 @@ def rest_V(world: World, experiment: Experiment, rollouts: RolloutRows, row: int
     return recording.rest_V(world, experiment.flight, in_hover_V)
 
 
-def with_flown_batteries(world: World, experiment: Experiment, rollouts: RolloutRows) -> World:
-    """A world whose batteries scatter as those did that were on board in a run; the world itself if nobody knows.
+def last_rest_V(world: World, experiment: Experiment, rollouts: RolloutRows) -> float:
+    """Voltage at rest of the last flown battery that is known; NaN: none is."""
+    known_V = [rest_V(world, experiment, rollouts, row) for row in np.flatnonzero(rollouts.status == SCORED).tolist()]
+    return next((volts for volts in reversed(known_V) if math.isfinite(volts)), math.nan)
 
-    What a simulator says of a policy that was flown, it says for them.
+
+def with_last_battery(world: World, experiment: Experiment, rollouts: RolloutRows) -> World:
+    """A world with the battery of the last flight, for which the learner recommends; the world itself if none is known.
+
+    One policy cannot serve a full and an empty battery alike, so a judge with another battery would judge another task.
     """
-    flown = np.flatnonzero(rollouts.status == SCORED).tolist()
-    known_V = np.array([rest_V(world, experiment, rollouts, row) for row in flown])
-    known_V = known_V[np.isfinite(known_V)]
-    if not known_V.size:
-        return world
-    return world.changed(**{"battery.voltage": float(known_V.mean()), "battery.voltage_scatter": float(known_V.std())})
+    volts = last_rest_V(world, experiment, rollouts)
+    return with_battery(world, volts) if math.isfinite(volts) else world
 
 
 def as_trace(flight: Flight, world: World, outcome: Any, simulated: Trace) -> Trace:

@@ -185,12 +185,13 @@ def run(
         learning.run(hooks.on_episode)
         source.close()
         rollouts = store.rollouts()
-        judging = [flown_landings.with_flown_batteries(worlds[0], chosen, rollouts)] if source.is_flown else worlds
+        judging = [flown_landings.with_last_battery(worlds[0], chosen, rollouts)] if source.is_flown else worlds
         flown = _Flown(chosen, judging, each, store.episodes(), rollouts, threads)
         bests, verdicts, summary = _judge(flown, folder, n_trials, hooks)
         if source.is_flown:
             found = flown_landings.landings(folder, chosen, worlds[0], flown.rollouts)
-            summary["flown"] = flown_landings.summary(found, flown.rollouts)
+            battery_V = flown_landings.last_rest_V(worlds[0], chosen, rollouts)
+            summary["flown"] = flown_landings.summary(found, rollouts) | {"judged_battery_V": _json_number(battery_V)}
         summary |= {
             "run_dir": str(folder),
             "learner": chosen.learner.name,

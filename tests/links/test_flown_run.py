@@ -98,7 +98,7 @@ def test_counterparts_and_judge_have_the_batteries_that_were_on_board(days: Days
     assert np.nanmin(flew_V) > battery.rest_V_min - 0.1, "a flight takes some of it"
     told = np.full((len(rollouts), recording.N), np.nan)
     unknown = replace(rollouts, recordings=told.copy())
-    assert flown.with_flown_batteries(world, days.chosen, unknown) is world
+    assert flown.with_last_battery(world, days.chosen, unknown) is world
     rest_V = np.where(np.arange(len(rollouts)) % 2 == 0, 3.7, 4.1)
     in_hover_V = [recording.hover_V(world, days.chosen.flight, volts) for volts in rest_V]
     told[:, recording.CONDITIONS[0]] = in_hover_V
@@ -110,10 +110,11 @@ def test_counterparts_and_judge_have_the_batteries_that_were_on_board(days: Days
     found = flown.landings(days.folder, days.chosen, world, known)
     (own,) = (each for each in found if each.row == row)
     assert np.array_equal(own.simulated.rows["p_WB_m"], spec.fly()[1].rows["p_WB_m"]), "the page and a replay agree"
-    scattered = flown.with_flown_batteries(world, days.chosen, known).params.values
-    scored = rest_V[rollouts.status == SCORED]
-    assert scattered["battery.voltage"] == pytest.approx(scored.mean())
-    assert scattered["battery.voltage_scatter"] == pytest.approx(scored.std())
+    last_V = rest_V[rollouts.status == SCORED][-1]
+    judging = flown.with_last_battery(world, days.chosen, known).params.values
+    assert judging["battery.voltage"] == pytest.approx(last_V)
+    assert judging["battery.voltage_scatter"] == 0.0
+    assert days.result.summary["flown"]["judged_battery_V"] == pytest.approx(flew_V[np.isfinite(flew_V)][-1])
 
 
 @pytest.fixture

@@ -331,6 +331,10 @@ def _lines_of_flown(flown: dict[str, Any]) -> list[tuple[str, str]]:
                                        f"{interval}); simulated, the same policies: "
                                        f"{console.percent(flown['simulated_rate'])}"),
     ]  # fmt: skip
+    if flown["judged_battery_V"] is not None:
+        lines.append(
+            ("battery of the judging simulator", f"{flown['judged_battery_V']:.2f} V at rest, as in the last flight")
+        )
     if flown["pitch_rms_deg_median"] is not None:
         text = f"pitch {flown['pitch_rms_deg_median']:.1f} deg rms, median of the flips"
         lines.append(("recorded against simulated", text))
