@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -27,12 +27,15 @@ class Plan:
         seed: Seed of the random numbers of each rollout's trial, shape (n,).
         stream: Number of each rollout within its trial, shape (n,).
         trial: Number of each rollout's trial within the run, shape (n,); None: all are of one trial.
+        rechoose: Given a policy of the plan, shape (dim,), and the voltage expected in the hover: the policy to fly if
+            the battery was changed since the plan was made; None: the plan's, whatever the battery.
     """
 
     theta: npt.NDArray[np.float64]
     seed: npt.NDArray[np.uint64]
     stream: npt.NDArray[np.uint64]
     trial: npt.NDArray[np.int64] | None = None
+    rechoose: Callable[[npt.NDArray[np.float64], float], npt.NDArray[np.float64]] | None = None
 
 
 @dataclass(frozen=True)

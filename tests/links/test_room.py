@@ -5,6 +5,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +193,27 @@ def test_battery_is_known_and_changed_before_a_policy_is_chosen(
     assert np.isnan(known_V), "without a rehearsed day that battery drives no motors"
     monkeypatch.setattr(type(source._site), "_battery_V", Room._battery_V)
     assert source.battery_V() == recording.hover_V(source.world, source._experiment.flight, 4.0)
+
+
+def test_a_battery_that_is_changed_between_two_attempts_gets_a_policy_of_its_own(
+    source: CrazyflieSource, server: SilProcess, script: Script, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site = source._site
+    assert site is not None
+    monkeypatch.setattr(site, "before_approach", lambda _: server.set("sil.vbat", 2.6))
+    monkeypatch.setattr(type(site), "_battery_V", Room._battery_V)
+    monkeypatch.setattr(recording, "hover_V", lambda _world, _flight, rest_V: rest_V - 0.5)
+    script.on_help = lambda _: server.set("sil.vbat", 4.1)
+    told: list[tuple[list[float], float]] = []
+
+    def rechoose(theta: np.ndarray, battery_V: float) -> np.ndarray:
+        told.append((theta.tolist(), battery_V))
+        return np.array([4.7, 7.9])
+
+    (flown,) = source.fly(replace(plan_of(GOOD), rechoose=rechoose))
+    assert told == [(list(GOOD.theta), pytest.approx(3.6))]
+    assert flown.theta is not None
+    assert flown.theta.tolist() == [[4.7, 7.9]]
 
 
 def test_vehicle_that_aborts_for_its_surroundings_is_not_scored(

@@ -165,7 +165,7 @@ def test_a_question_at_the_terminal_is_shown_until_it_is_answered(
         asked.result()
         look.until("document.querySelector('#asked').hidden")
         assert look.text("log").splitlines() == [
-            "BATTERY: 3.42 V, needed 3.70 V; the same policy is next.",
+            "BATTERY: 3.42 V, needed 3.70 V; the same rollout is next.",
             "change the battery and switch the vehicle on, then [changed | stop]: changed",
         ]
     look.page.close()

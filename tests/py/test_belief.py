@@ -403,6 +403,11 @@ def test_a_battery_that_is_known_before_a_flight_is_decided_for(
             learner.take_battery(battery_V)
         monkeypatch.setattr(decide, "safest", safest)
         assert decided == ([3.7, 3.5] if lasts else [])
+        chosen_theta = learner.ask()[0]
+        assert np.array_equal(learner.rechosen(chosen_theta + 0.1, 3.3), chosen_theta + 0.1), "an operator's stays"
+        assert np.array_equal(learner.rechosen(chosen_theta, 3.9), learner.ask()[0])
+        learner = learner_of(chosen, n_particles=32)
+        learner.take_battery(3.7)
         assert learner._rng.bit_generator.state == other._rng.bit_generator.state, "later numbers stay as they were"
 
 

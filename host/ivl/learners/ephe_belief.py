@@ -181,6 +181,12 @@ class EpheBelief(EpheMemory):
         rng = copy.deepcopy(self._rng)
         self._choice, self._margin_rate = decide.safest(self._belief, self._corrected, self._bounds, rng)
 
+    def rechosen(self, theta: FloatArray, battery_V: float) -> FloatArray:
+        """The choice for another battery in place of that which was asked for, shape (dim,); other policies stay."""
+        is_choice = self._belief is not None and np.array_equal(theta, self._choice)
+        self.take_battery(battery_V)
+        return self._choice if is_choice else theta
+
     def _rates_flown(self, theta: FloatArray, conditions: FloatArray) -> FloatArray:
         """Landing rates that the belief, uncorrected, expects of flights; if a battery lasts, each with its own."""
         assert self._belief is not None

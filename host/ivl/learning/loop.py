@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -152,7 +153,8 @@ class LearningRun:
         """Fly what is still planned and record each portion as it comes."""
         still = np.flatnonzero(rollouts.status == PLANNED)
         trial = rollouts.trial[still]
-        plan = Plan(rollouts.theta[still], self._world_seed[trial], rollouts.stream[still], trial)
+        rechoose = partial(_rechosen, self._learners[int(trial[0])]) if len(self._learners) == 1 else None
+        plan = Plan(rollouts.theta[still], self._world_seed[trial], rollouts.stream[still], trial, rechoose)
         assert self._source is not None
         for flown in self._source.fly(plan):
             rows = still[flown.index]
@@ -201,6 +203,11 @@ class LearningRun:
 
     def _states(self, trials: Iterable[int]) -> Iterator[dict[str, Any]]:
         return (self._learners[trial].state_dict() for trial in trials)
+
+
+def _rechosen(learner: Learner, theta: FloatArray, battery_V: float) -> FloatArray:
+    """What a learner flies in place of a policy that it chose for another battery."""
+    return learner.rechosen(theta, battery_V) if isinstance(learner, EpheBelief) else theta
 
 
 def _begun(learner: Learner, simulator: Simulator) -> Learner:

@@ -10,7 +10,7 @@ All that depends on where is flown is the business of a site (`ivl.links.sites`)
 import math
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import count
 from typing import Any
@@ -40,6 +40,10 @@ from ivl.outcome import Outcomes, end_code, valid
 from ivl.source import Flown, Plan
 
 _AGAIN_S, _IDLE_S = 0.2, 3.0
+
+
+Rechoose = Callable[[np.ndarray[Any, np.dtype[np.float64]], float], np.ndarray[Any, np.dtype[np.float64]]]
+"""See `ivl.source.Plan`."""
 
 
 class VehicleAway(FlyingEnds):
@@ -119,7 +123,7 @@ class CrazyflieSource:
         """
         for i in range(len(plan.theta)):
             rollout = Rollout(tuple(plan.theta[i].tolist()), int(plan.seed[i]), int(plan.stream[i]))
-            yield self._fly_until_known(np.array([i], dtype=np.intp), rollout)
+            yield self._fly_until_known(np.array([i], dtype=np.intp), rollout, plan.rechoose)
 
     def battery_V(self) -> float:
         """Voltage expected in the hover of the next flight, from that at rest; and of another battery if this is low.
@@ -175,10 +179,14 @@ class CrazyflieSource:
             raise LinkError(f"{self.uri}: the link is closed")
         return LandingFlight(vehicle, self._experiment).fly(site, rollout)
 
-    def _fly_until_known(self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout) -> Flown:
+    def _fly_until_known(
+        self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout, rechoose: Rechoose | None = None
+    ) -> Flown:
         planned = rollout.theta
         for n in count(1):
             try:
+                if n > 1 and rechoose is not None:
+                    rollout = self._rechosen(rollout, rechoose)
                 if self._vehicle is None:
                     self._return()
                 landing = self.fly_one(rollout)
@@ -208,6 +216,17 @@ class CrazyflieSource:
                 self._recover()
                 self._meet(rollout, told, n)
         raise AssertionError("count has no end")
+
+    def _rechosen(self, rollout: Rollout, rechoose: Rechoose) -> Rollout:
+        """The rollout with the policy for the battery that is on board now, which may be another one since."""
+        battery_V = self.battery_V()
+        if not math.isfinite(battery_V):
+            return rollout
+        theta = tuple(rechoose(np.array(rollout.theta), battery_V).tolist())
+        if theta != rollout.theta:
+            self._note(rollout, f"instead, for another battery: {' '.join(f'{value:g}' for value in theta)}")
+            self.options.say(f"another battery, so another policy: {self._experiment.policy.shape.describe(theta)}")
+        return replace(rollout, theta=theta)
 
     def _without_flight(
         self, index: np.ndarray[Any, np.dtype[np.intp]], rollout: Rollout, what: str, why: str

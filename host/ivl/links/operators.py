@@ -211,7 +211,7 @@ class ConsoleOperator:
 
     def change_battery(self, battery_V: float, needed_V: float) -> None:
         """Ask."""
-        self._tell(f"BATTERY: {battery_V:.2f} V, needed {needed_V:.2f} V; the same policy is next.")
+        self._tell(f"BATTERY: {battery_V:.2f} V, needed {needed_V:.2f} V; the same rollout is next.")
         self._ask(f"{state_of(Cause.BATTERY).asks}, then", ["changed"])
 
     def help(self, cause: Cause) -> None:

@@ -79,7 +79,7 @@ class AskOperator:
         """Ask, if there is something to ask; the same policy is announced next."""
         del n
         cause = cause_of(error)
-        self._say(f"{cause}: {error}; the same policy is next")
+        self._say(f"{cause}: {error}; the same rollout is next")
         if state_of(cause).asks:
             self._operator.help(cause)
 

@@ -103,8 +103,10 @@ function showTracking(v) {
 
 function showNoVehicle(now) {
   const replay = now.replay;
-  const lost = !now.in_process && Boolean(live.moment);
-  put("phase", replay ? replay.phase : now.in_process ? "simulating" : lost ? "not connected" : "preparing", lost ? "bad" : "");
+  const { learning } = live.parts, done = Boolean(learning) && learning.n_flown >= learning.n_all;
+  const lost = !now.in_process && !done && Boolean(live.moment);
+  const waits = done ? "all flown" : lost ? "not connected" : "preparing";
+  put("phase", replay ? replay.phase : now.in_process ? "simulating" : waits, lost ? "bad" : "");
   put("rule", replay ? `replay of rollout ${replay.number}, a quarter of the speed` : "");
   put("battery", replay && replay.battery_V !== null ? `${replay.battery_V.toFixed(2)} V` : "-");
   put("battery-note", replay ? "simulated" : "");

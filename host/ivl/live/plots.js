@@ -16,7 +16,8 @@ function frame(canvas, title, [x0, x1], [y0, y1]) {
     height - EDGE.bottom - (height - EDGE.top - EDGE.bottom) * (y - y0) / (y1 - y0 || 1)];
   line(context, [at(x0, y1), at(x0, y0), at(x1, y0)], COLOUR.line, 1);
   words(context, title, EDGE.left, 12, COLOUR.soft, "left", 12);
-  for (const [y, dy] of [[y0, 0], [y1, 10]]) words(context, short(y), EDGE.left - 5, at(x0, y)[1] + dy, COLOUR.soft, "right", 11);
+  const round = (y) => (Math.abs(y) < 1e-4 * (y1 - y0) ? 0 : y);
+  for (const [y, dy] of [[y0, 0], [y1, 10]]) words(context, short(round(y)), EDGE.left - 5, at(x0, y)[1] + dy, COLOUR.soft, "right", 11);
   for (const [x, align] of [[x0, "left"], [x1, "right"]]) words(context, String(+x.toFixed(2)), at(x, y0)[0], height - 3, COLOUR.soft, align, 11);
   return { context, at };
 }
