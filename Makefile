@@ -428,13 +428,13 @@ $(BIN)/python:
 
 $(VENV)/.stamp-run: $(BIN)/python pyproject.toml tools/constraints.txt
 	$(say) 'setup: installing ivl and what it needs'
-	@$(pip) --editable '.[link,sweep,report,live]'
+	@$(pip) --editable '.[link,sweep,report,live,video]'
 	@touch $@
 
 # what is needed to run is a part of it, and is not installed twice
 $(VENV)/.stamp-dev: $(BIN)/python pyproject.toml tools/constraints.txt
 	$(say) 'setup: installing ivl and what it, its tests and lint need'
-	@$(pip) --editable '.[link,sweep,report,live,gym,optimisers,cluster,rerun,cfclient,test,mujoco,lint,stm32,docs,notebook]'
+	@$(pip) --editable '.[link,sweep,report,live,video,gym,optimisers,cluster,rerun,cfclient,test,mujoco,lint,stm32,docs,notebook]'
 	@touch $(VENV)/.stamp-run $@
 
 $(UNITY)/unity.c: tools/get_unity.sh tools/unity.txt | $(BIN)/python

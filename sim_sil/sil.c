@@ -172,7 +172,9 @@ void *ivl_sil_model_create(const double *params, char *error, size_t error_size)
 
 void ivl_sil_model_free(void *model)
 {
-    free(model);
+    ivl_sim_model_t *m = model;
+    free(m->eye.context);  // NULL without a camera
+    free(m);
 }
 
 void ivl_sil_model_derived(const void *model, void *derived)

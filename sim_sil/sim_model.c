@@ -199,6 +199,30 @@ static void tell_firmware(ivl_sim_model_t *model)
     cfg->surface_tilt_rad = (float)tilt_rad(raw);
 }
 
+/// A camera that is rendered takes one picture a tick at the most, and is the only one that tells RREV and flow.
+static bool camera_possible(const ivl_sim_model_t *model, char *error, size_t error_size)
+{
+    const ivl_sim_params_t *raw = &model->raw;
+    const double            tick_hz = (double)model->firmware.tick_hz;
+    if (raw->camera_rate_hz > 0.0 && (raw->rrev_rate_hz > 0.0 || raw->flow_rate_hz > 0.0))
+    {
+        snprintf(error, error_size, "camera.rate: %g: goes with neither rrev.rate nor flow.rate, which stand for a camera themselves",
+                 raw->camera_rate_hz);
+        return false;
+    }
+    if (raw->camera_rate_hz > 0.5 * tick_hz)
+    {
+        snprintf(error, error_size, "camera.rate: %g Hz: must not be above half of firmware.tick_hz, %g Hz", raw->camera_rate_hz, tick_hz);
+        return false;
+    }
+    if ((raw->camera_width_px > 160.0 && raw->camera_width_px < 320.0))
+    {
+        snprintf(error, error_size, "camera.width: %g px: must be 160 or 320", raw->camera_width_px);
+        return false;
+    }
+    return true;
+}
+
 bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, const ivl_cfg_t *firmware, char *error, size_t error_size)
 {
     if (!in_range(raw, error, error_size))
@@ -247,6 +271,10 @@ bool ivl_sim_model_init(ivl_sim_model_t *model, const ivl_sim_params_t *raw, con
         return false;
     }
     model->tick_s = 1.0 / (double)model->firmware.tick_hz;
+    if (!camera_possible(model, error, error_size))
+    {
+        return false;
+    }
     model->readings = &ivl_sim_readings;
     model->has_readings = ivl_sim_readings_any(model);
     const double rate = (double)model->firmware.tick_hz;

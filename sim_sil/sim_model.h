@@ -13,6 +13,7 @@
 #include "phys_math.h"
 #include "phys_surface.h"
 #include "sim_core.h"
+#include "sim_eye.h"
 #include "sim_params.h"
 
 enum
@@ -93,6 +94,7 @@ typedef struct
     const ivl_sim_reading_table_t *readings;      ///< sensors of one number beside the state estimate
     bool                           has_readings;  ///< some of them is switched on
     ivl_sim_core_t                 core;          ///< where the firmware runs
+    ivl_sim_eye_t                  eye;           ///< the camera of camera.rate, once it has been given a surface to look at
 } ivl_sim_model_t;
 
 /// Checks raw parameters and derives the model.

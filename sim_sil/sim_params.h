@@ -9,6 +9,8 @@
 
 #include <math.h>
 
+#include "camera_params.h"
+
 #define IVL_SIM_REQUIRED  ((double)NAN)
 #define IVL_SIM_UNLIMITED ((double)INFINITY)
 
@@ -100,6 +102,11 @@
     X(rrev, noise_rel, norm, "1", 0.0, 1.0, 0.0, "and part of the value; the two are independent") \
     X(rrev, resolution, per_s, "1/s", 0.0, 1.0, 0.0, "values are multiples of this; 0: not rounded") \
     X(rrev, max, per_s, "1/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
+    X(rrev, mean_rel, norm, "1", -0.5, 0.5, 0.0, "mean error, part of the value") \
+    X(rrev, bias_rel, norm, "1", 0.0, 0.5, 0.0, "standard deviation of an error that is a part of the value, drawn once a rollout") \
+    X(rrev, correlation, norm, "1", 0.0, 0.99, 0.0, "of the noise of two samples in a row") \
+    X(rrev, outlier, norm, "1", 0.0, 1.0, 0.0, "chance that a sample has a further error") \
+    X(rrev, outlier_rel, norm, "1", 0.0, 10.0, 0.0, "standard deviation of that error, part of the value") \
     X(rrev, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
     X(range, rate, hz, "Hz", 0.0, 500.0, 0.0, "ranging sensor along b_z: samples per second; 0: there is none") \
     X(range, delay, s, "s", 0.0, 0.12, 0.0, "from the sampling instant to the arrival") \
@@ -114,7 +121,13 @@
     X(flow, noise, radps, "rad/s", 0.0, 10.0, 0.0, "standard deviation of a sample") \
     X(flow, resolution, radps, "rad/s", 0.0, 1.0, 0.0, "values are multiples of this; 0: not rounded") \
     X(flow, max, radps, "rad/s", 0.1, IVL_SIM_UNLIMITED, IVL_SIM_UNLIMITED, "a value beyond this is told as invalid") \
+    X(flow, bias, radps, "rad/s", 0.0, 5.0, 0.0, "standard deviation of the offset, drawn once a rollout") \
+    X(flow, correlation, norm, "1", 0.0, 0.99, 0.0, "of the noise of two samples in a row") \
+    X(flow, outlier, norm, "1", 0.0, 1.0, 0.0, "chance that a sample has a further error") \
+    X(flow, outlier_size, radps, "rad/s", 0.0, 50.0, 0.0, "standard deviation of that error") \
     X(flow, drop, norm, "1", 0.0, 1.0, 0.0, "chance that a sample is told as invalid") \
+    IVL_CAMERA_LOOP_PARAMS(X) \
+    IVL_CAMERA_PARAMS(X) \
     X(start, hold_time, s, "s", 0.0, 5.0, 0.39, "flown start: time at full speed that is left, before the ceiling would be reached") \
     X(start, room, m, "m", 0.0, 10.0, 0.0, "flown start: at least this far below the plane of the cues, for an approach faster than commanded") \
     X(end, contact_time, s, "s", 0.01, 10.0, 1.0, "a rollout ends this long after the first contact") \

@@ -31,6 +31,10 @@ typedef enum
     IVL_SIM_DRAW_RANGE_DROP,
     IVL_SIM_DRAW_FLOW_DROP,
     IVL_SIM_DRAW_BATTERY,       ///< open-circuit voltage of a rollout
+    IVL_SIM_DRAW_SIGHT_PLACE,   ///< where on its surface a rendered camera begins
+    IVL_SIM_DRAW_SIGHT_DROP,    ///< its readings that are lost
+    IVL_SIM_DRAW_RREV_OUTLIER,  ///< readings of the sensors of one number that have little to do with the truth
+    IVL_SIM_DRAW_FLOW_OUTLIER,
     IVL_SIM_DRAW_FURTHER = 32,  ///< the first of those that are left for further sensors, two each
 } ivl_sim_draw_t;
 

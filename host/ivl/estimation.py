@@ -121,7 +121,7 @@ def study(
 def estimators_of(sensors: str) -> list[str]:
     """Sources of the distance for which a sensor set has what they need."""
     given = {name for name, quantity in model.load_sensors(sensors).quantities.items() if quantity.value != 0.0}
-    has_rrev, has_range = "rrev.rate" in given, "range.rate" in given
+    has_rrev, has_range = "rrev.rate" in given or "camera.rate" in given, "range.rate" in given
     if "sense.inertial" not in given:
         return ["known_height", "known_height_predicted"]
     names = ["formula", "formula_unguarded"] if has_rrev else []

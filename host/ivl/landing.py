@@ -9,7 +9,7 @@ same bits, today and in a report years later.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import Field, model_validator
 
@@ -20,6 +20,9 @@ from ivl.seeds import Purpose, derive
 from ivl.settings import Finite, check_overrides, read_mapping
 from ivl.task import Task, settings_of
 from ivl.world import CANNOT_BEGIN, REFUSED, Trace, World
+
+if TYPE_CHECKING:
+    from ivl.camera.film import Film
 
 TRACE_PERIOD_S = 0.001
 """Finest useful period: rows come once a tick of the flight core at the most."""
@@ -83,6 +86,19 @@ class LandingSpec(Task):
         if world.end_reason(trace.outcome["end_reason"]) == REFUSED:
             raise ArgumentError(f"this landing cannot begin: {CANNOT_BEGIN}")
         return world, trace
+
+    def film(self, world: World) -> "Film":
+        """Fly it again, and keep what its camera saw, pictures included.
+
+        Raises:
+            ConfigError: The sensor set has no camera.
+        """
+        from ivl.camera import film  # which scipy takes a while to load for
+
+        return film.shoot(
+            world, self.speed_mps, self.angle_deg, *self.theta, pictures=True,
+            form=self.form, seed=self.seed, start=self.start, d_ceil_m=self.d_ceil_m, stream=self.stream,
+        )  # fmt: skip
 
 
 def _in_order(data: dict[str, Any]) -> dict[str, Any]:

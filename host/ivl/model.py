@@ -23,7 +23,7 @@ from ivl.references import absolute, is_path
 VEHICLES_DIR = Path(__file__).parent / "vehicles"
 GEARS_DIR = Path(__file__).parent / "gears"
 SENSORS_DIR = Path(__file__).parent / "sensors"
-SENSING_GROUPS = ("sense", "rrev", "range", "flow")
+SENSING_GROUPS = ("sense", "rrev", "range", "flow", "camera")
 """Groups of parameters that a sensor set gives as a whole: what it leaves out is at its default."""
 DEFAULT_VEHICLE, DEFAULT_GEAR, DEFAULT_GEAR_SET = "habas2021", "wide_short", "table1"
 """What is flown where nobody says anything else: the paper's vehicle with legs of the paper's Table I, which are those
@@ -52,6 +52,7 @@ class _Header(BaseModel):
 
 class _SensorHeader(_Header):
     includes: list[str] = Field(default_factory=list)
+    texture: str | None = None
 
 
 class _Reference(BaseModel):
@@ -71,12 +72,14 @@ class Part:
         doc: What it is, in a sentence.
         label: File (and design) that errors name.
         quantities: Quantity of each parameter that the file gives.
+        texture: Surface that a rendered camera of a sensor set looks at; None without one.
     """
 
     name: str
     doc: str
     label: str
     quantities: Mapping[str, Quantity]
+    texture: str | None = None
 
 
 @dataclass(frozen=True)
@@ -87,11 +90,13 @@ class Parameters:
         values: Value of each parameter, in table order.
         origin: Where each value comes from: a file's label, "default" or "override".
         sigma: Standard deviation of each value that a file gives with one and that no override replaces.
+        texture: Surface that a rendered camera looks at, None without one.
     """
 
     values: Mapping[str, float]
     origin: Mapping[str, str]
     sigma: Mapping[str, float]
+    texture: str | None = None
 
     def vector(self) -> npt.NDArray[np.float64]:
         """The values as the library takes them, shape (n_params,)."""
@@ -100,6 +105,8 @@ class Parameters:
     def digest(self) -> str:
         """SHA-256 over names and exact values: equal digests mean equal worlds."""
         text = "\n".join(f"{name}={value.hex()}" for name, value in self.values.items())
+        if self.texture is not None:
+            text += f"\ntexture={self.texture}"
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -157,7 +164,7 @@ def load_sensors(name_or_path: str, table: Table | None = None) -> Part:
     table = table or native.library().params
     header, label, given = _load_sensors(name_or_path, table, ())
     quantities = {name: _followed(name, entry, given, table, label) for name, entry in given.items()}
-    return Part(header.name, header.doc, label, quantities)
+    return Part(header.name, header.doc, label, quantities, header.texture)
 
 
 def _followed(
@@ -196,8 +203,12 @@ def _load_sensors(
                 f"{path.name}: {group}: not part of a sensor set (allowed {', '.join(SENSING_GROUPS)}, firmware)"
             )
     given: dict[str, Quantity | _Reference] = {}
+    texture = None
     for name in header.includes:
-        given |= _load_sensors(absolute(name, path.parent), table, (*including, path))[2]
+        included, _, theirs = _load_sensors(absolute(name, path.parent), table, (*including, path))
+        given |= theirs
+        texture = included.texture or texture
+    header = header.model_copy(update={"texture": header.texture or texture})
     references = _references(groups, path.name, table)
     numbers = {
         group: {key: raw for key, raw in members.items() if f"{group}.{key}" not in references}

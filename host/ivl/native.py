@@ -294,6 +294,50 @@ class NativeModel:
         self._library._c.ivl_sil_model_surface(self._handle, _pointer(record))
         return record
 
+    def give_camera(self, texture: Any) -> None:
+        """Give the camera of `camera.rate` a surface to look at (`ivl.camera.native.Texture`); once.
+
+        Raises:
+            NativeError: The estimator refuses the camera, or there is no memory.
+        """
+        result = int(self._library._c.ivl_sil_model_camera(self._handle, texture.handle))
+        if result:
+            raise NativeError(("the estimator refuses this camera", "there is not enough memory")[result - 1])
+        weakref.finalize(self, _keep, texture)
+
+    def film(
+        self,
+        spec: npt.NDArray[np.void],
+        capacity: int,
+        row_doubles: int,
+        reading: np.dtype[np.void],
+        shape: tuple[int, int] | None,
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.void], npt.NDArray[np.uint8] | None, npt.NDArray[np.void]]:
+        """Fly one spec and keep what its camera saw: rows of the motion, readings, pictures, outcome of shape (1,).
+
+        Args:
+            spec: One record of `spec_dtype`.
+            capacity: Most pictures that are kept.
+            row_doubles: Numbers of a row.
+            reading: Record of a reading.
+            shape: Rows and columns of a picture; None: the pictures are not kept.
+
+        Raises:
+            NativeError: There is no camera, no memory, or there are more pictures.
+        """
+        outcome = np.zeros(1, dtype=self._library.outcome_dtype)
+        rows, readings = np.zeros((capacity, row_doubles)), np.zeros(capacity, dtype=reading)
+        grey = None if shape is None else np.zeros((capacity, *shape), dtype=np.uint8)
+        n = int(
+            self._library._c.ivl_sil_camera_film(
+                self._handle, _pointer(spec), capacity, _pointer(rows), _pointer(readings),
+                None if grey is None else _pointer(grey), _pointer(outcome),
+            )
+        )  # fmt: skip
+        if not 0 <= n <= capacity:
+            raise NativeError(f"the film of a landing has {n} pictures, not 0 .. {capacity}: no camera, or no memory")
+        return rows[:n], readings[:n], None if grey is None else grey[:n], outcome
+
     def config(self) -> tuple[npt.NDArray[np.void], int]:
         """The flight core's configuration, one record of the layout `LAYOUT_CONFIG`, and its CRC-32."""
         record = np.zeros(1, dtype=self._library.layout(LAYOUT_CONFIG)[1])
@@ -421,6 +465,10 @@ class NativeModel:
         return rows
 
 
+def _keep(_: object) -> None:
+    """Holds a reference until its owner is gone."""
+
+
 @cache
 def library() -> NativeLibrary:
     """The library of this process, loaded on first use."""
@@ -439,7 +487,9 @@ def _declare(c: Any) -> None:
         ("ivl_sil_model_free", None, (ptr,)),
         ("ivl_sil_model_derived", None, (ptr, ptr)),
         ("ivl_sil_model_surface", None, (ptr, ptr)),
+        ("ivl_sil_model_camera", c_int, (ptr, ptr)),
         ("ivl_sil_surface_forward", None, (ptr, ptr)),
+        ("ivl_sil_camera_film", ctypes.c_long, (ptr, ptr, size, ptr, ptr, ptr, ptr)),
         ("ivl_sil_rollouts", c_int, (ptr, ptr, size, c_int, ptr, ptr)),
         ("ivl_sil_trace", ctypes.c_long, (ptr, ptr, double, ptr, size, ptr)),
         ("ivl_sil_traces", c_int, (ptr, ptr, size, c_int, double, ptr, size, ptr, ptr)),

@@ -9,6 +9,7 @@ EXTRAS = {
     "pyarrow": "sweep", "pandas": "sweep", "xarray": "sweep", "dask": "sweep", "distributed": "sweep",
     "cryptography": "sweep", "dask_jobqueue": "cluster", "plotly": "report", "mcap": "report", "rerun": "rerun",
     "tornado": "live", "foxglove": "live", "cflib": "link", "cantools": "link", "can": "link", "gymnasium": "gym",
+    "imageio_ffmpeg": "video",
 }  # fmt: skip
 """Packages of extras, and the extra that brings each, for commands that cannot do without."""
 

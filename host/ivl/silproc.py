@@ -22,7 +22,7 @@ from types import TracebackType
 from typing import IO, Self
 
 from ivl import native
-from ivl.errors import LinkError, NativeError
+from ivl.errors import ConfigError, LinkError, NativeError
 from ivl.world import World
 
 SERVER_ENV = "IVL_NATIVE_SERVER"  # another build of the program, for example one with sanitizers
@@ -44,7 +44,15 @@ def server_path() -> Path:
 
 
 def model_text(world: World) -> str:
-    """The world's parameters as the program reads them: exact, in the library's order, with a check sum."""
+    """The world's parameters as the program reads them: exact, in the library's order, with a check sum.
+
+    Raises:
+        ConfigError: The world has a camera that is rendered.
+    """
+    if world.params.values["camera.rate"] > 0.0:
+        raise ConfigError(
+            f"sensors {world.sensing}: pictures are rendered in process only; fly a noise model: aideck60_panels"
+        )
     lines = ["ivl_sil_model 1"]
     lines += [f"{name} {value.hex()}" for name, value in world.params.values.items()]
     body = "\n".join(lines) + "\n"

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from ivl import model, native
+from ivl.camera.textures import TEXTURES
 from ivl.errors import ConfigError
 from ivl.family import FamilyChoice, chosen_member
 from ivl.sensing import APPROACHES, ESTIMATORS, approach_settings, estimator_settings
@@ -68,6 +69,11 @@ class Setup(Strict):
     gear_set: str = Field(default=model.DEFAULT_GEAR_SET, description="Set of landing gears.")
     sensing: str | None = Field(
         default=None, description="Sensor set in place of the vehicle's own sensing; see `ivl list sensors`."
+    )
+    texture: str | None = Field(
+        default=None,
+        description="Surface that a rendered camera sees, in place of the sensor set's: "
+        f"{', '.join(TEXTURES)}, or a picture (.png).",
     )
     estimator: Annotated[str, AfterValidator(_estimator)] | None = Field(
         default=None,
@@ -124,7 +130,7 @@ class Setup(Strict):
 
     def nominal_world_of(self, gear: str) -> World:
         """The world of the files and overrides, whichever member flies."""
-        return World(self.vehicle, gear, self.gear_set, self.sensing, **self.world_settings())
+        return World(self.vehicle, gear, self.gear_set, self.sensing, self.texture, **self.world_settings())
 
     def setup(self) -> dict[str, Any]:
         """The fields of the set-up by name, to make another object of them."""

@@ -11,14 +11,15 @@ on one thread or many.
 import math
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ivl import forms, model, native
-from ivl.errors import ArgumentError, NativeError
+from ivl.camera import textures
+from ivl.errors import ArgumentError, ConfigError, NativeError
 from ivl.outcome import as_dict, verdict
 from ivl.surface import Surface
 from ivl.table import Rollouts, Rows
@@ -142,6 +143,7 @@ class World:
         gear: str = model.DEFAULT_GEAR,
         gear_set: str = model.DEFAULT_GEAR_SET,
         sensing: str | None = None,
+        texture: str | None = None,
         **overrides: float,
     ) -> None:
         """Read, check and assemble the files and build the native model.
@@ -151,6 +153,7 @@ class World:
             gear: Name of a design in the gear set.
             gear_set: Name of a shipped gear set, or a path to a YAML file.
             sensing: Name of a shipped sensor set, or a path to a YAML file; it replaces the vehicle's own sensing.
+            texture: Surface that a rendered camera looks at, a name or a picture file, in place of the sensor set's.
             **overrides: Parameter values by dotted name, in the unit of the parameter table.
 
         Raises:
@@ -159,7 +162,9 @@ class World:
         """
         self.vehicle, self.gear, self.gear_set, self.sensing = vehicle, gear, gear_set, sensing
         self.overrides = dict(overrides)
-        self._build(model.assemble(_parts(vehicle, gear, gear_set, sensing), overrides))
+        parts = _parts(vehicle, gear, gear_set, sensing)
+        params = model.assemble(parts, overrides)
+        self._build(replace(params, texture=_texture_of(params, parts[-1], texture)))
 
     def _build(self, params: model.Parameters) -> None:
         self.params = params
@@ -168,6 +173,10 @@ class World:
             self._native = self._library.create_model(params.vector())
         except NativeError as error:
             raise NativeError(f"vehicle {self.vehicle}, gear {self.gear_set}/{self.gear}: {error}") from error
+        if params.values["camera.rate"] > 0.0:
+            if params.texture is None:
+                raise ConfigError("camera.rate: a camera needs a surface to look at: give a texture")
+            self._native.give_camera(textures.make(params.texture, params.values["camera.texture_length"]))
         self.surface = Surface.of(self._native)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -184,6 +193,7 @@ class World:
         """The call that makes this world."""
         extra = "".join(f", {name}={value!r}" for name, value in self.overrides.items())
         sensing = f", sensing={self.sensing!r}" if self.sensing else ""
+        sensing += f", texture={self.texture!r}" if self.texture else ""
         return f"World(vehicle={self.vehicle!r}, gear={self.gear!r}, gear_set={self.gear_set!r}{sensing}{extra})"
 
     def changed(self, **overrides: float) -> "World":
@@ -203,8 +213,13 @@ class World:
         world.__dict__.update({k: v for k, v in self.__dict__.items() if k not in ("params", "surface", "_native")})
         world.overrides = {**self.overrides, **overrides}
         sigma = {name: value for name, value in self.params.sigma.items() if name not in overrides}
-        world._build(model.Parameters(values, origin, sigma))
+        world._build(model.Parameters(values, origin, sigma, self.params.texture))
         return world
+
+    @property
+    def texture(self) -> str | None:
+        """Surface that a rendered camera looks at, None without one."""
+        return self.params.texture
 
     @property
     def native_model(self) -> native.NativeModel:
@@ -315,6 +330,29 @@ class World:
             raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
         rows, outcome = self._native.trace(specs(slice(0, 1)), period_s)
         return Trace(rows.view(Rows), outcome.view(np.recarray)[0])
+
+    def specification(
+        self,
+        speed_mps: float,
+        angle_deg: float,
+        *theta: float,
+        form: str = forms.PAPER,
+        seed: int = 0,
+        start: str = "imparted",
+        d_ceil_m: float | None = None,
+        stream: int = 0,
+        state: State | None = None,
+        flip_at_s: float | None = None,
+        **named: float,
+    ) -> npt.NDArray[np.void]:
+        """The checked record of one rollout for further calls of the library (arguments and errors as `trace`)."""
+        specs, shape, _ = self._specs(
+            start, stream, state, form, theta, named,
+            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed, flip_at_s=flip_at_s,
+        )  # fmt: skip
+        if shape != ():
+            raise ArgumentError(f"the arguments must be scalars, they broadcast to {shape}")
+        return specs(slice(0, 1))
 
     def approaches(
         self,
@@ -534,6 +572,22 @@ def _parts(vehicle: str, gear: str, gear_set: str, sensing: str | None) -> list[
     if sensing is not None:
         parts = [model.without_sensors(airframe), parts[1], model.load_sensors(sensing)]
     return parts
+
+
+def _texture_of(params: model.Parameters, sensors: model.Part, texture: str | None) -> str | None:
+    """The surface that the camera looks at; None where there is no camera.
+
+    Raises:
+        ConfigError: A surface is given and there is no camera.
+    """
+    if params.values["camera.rate"] > 0.0:
+        return texture or sensors.texture
+    if texture is not None:
+        raise ConfigError(
+            f"texture {texture!r}: {sensors.label} has no camera that looks at it (camera.rate is 0): "
+            "choose a sensor set with one, such as aideck60"
+        )
+    return None
 
 
 def _numbers(name: str, value: npt.ArrayLike | None) -> npt.NDArray[Any]:

@@ -6,8 +6,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "camera_eye.h"
+#include "camera_loop.h"
 #include "camera_render.h"
-#include "ivl_vision.h"
 #include "sil.h"
 
 /// A row of a motion: a pose, and the attitude that the estimator gets.
@@ -16,24 +17,6 @@ typedef struct
     ivl_camera_pose_t pose;
     double            q_told_SB[4];
 } ivl_camera_row_t;
-
-/// The estimator and its memory, and the flat field that it is given.
-typedef struct
-{
-    ivl_vision_cfg_t   cfg;
-    ivl_vision_state_t state;
-    uint16_t           flat_q12[IVL_VISION_FLAT_ROWS * IVL_VISION_FLAT_COLUMNS];
-    double             q_told[4];  ///< with the last picture
-    double             exposure_s;
-    bool               seen;
-} ivl_camera_eye_t;
-
-/// An estimator that knows this camera: its focal length, distortion and flat field, but not how it is tilted.
-/// @return false if the estimator refuses the camera
-bool ivl_camera_eye_init(const ivl_camera_params_t *params, ivl_camera_eye_t *eye);
-
-/// Shows a picture to the estimator.
-void ivl_camera_eye_look(ivl_camera_eye_t *eye, const uint8_t *grey, double t_s, const double q_told_SB[4], ivl_vision_out_t *out);
 
 /// The table of ivl_camera_params_t.
 const ivl_sil_field_t *ivl_sil_camera_table(uint32_t *n_fields, uint32_t *item_size);
@@ -59,5 +42,16 @@ int ivl_sil_camera_run(const void *params, const void *texture, const double *ro
 /// @param[in] rows  as above; only time and told attitude are read
 /// @return 0; 1 if the estimator refuses the camera, 2 if there is no memory
 int ivl_sil_vision_run(const void *params, const uint8_t *grey, const double *rows, size_t n, void *readings);
+
+/// Gives a model with camera.rate a surface to look at, once.  The surface must live as long as the model.
+/// @return 0; 1 if the estimator refuses the camera, 2 if there is no memory
+int ivl_sil_model_camera(void *model, const void *texture);
+
+/// Flies one landing and writes down what its camera saw: the same bits as without.
+/// @param[out] rows      capacity rows of ivl_camera_row_t
+/// @param[out] readings  capacity rows of ivl_vision_out_t
+/// @param[out] grey      capacity pictures, or NULL
+/// @return number of pictures, those beyond the capacity included; -1 if the model has no camera, or there is no memory
+long ivl_sil_camera_film(const void *model, const void *spec, size_t capacity, double *rows, void *readings, uint8_t *grey, void *outcome);
 
 #endif  // IVL_CAMERA_SIL_H

@@ -13,6 +13,7 @@
 #include "sim_autopilot.h"
 #include "world_drive.h"
 #include "world_sensors.h"
+#include "world_sight.h"
 
 enum
 {
@@ -71,6 +72,7 @@ typedef struct
     uint32_t               n_approach_tick, n_valid_tick;  ///< ticks of the approach, and those with a valid distance
     ivl_sim_foot_t         foot[IVL_SIM_LEGS];
     ivl_sim_sensors_t      sensors;
+    ivl_sim_sight_t        sight;
     ivl_state_t            firmware;
     ivl_in_t               in;  ///< what the sensors say, and the command
     ivl_sim_autopilot_t    autopilot;
@@ -86,6 +88,7 @@ typedef struct
 {
     const ivl_sim_model_t *model;
     void                  *port;  ///< of the flight cores
+    void                  *eyes;  ///< port of the model's camera; NULL: there is none
     ivl_sim_state_t        state, next;
     ivl_sim_rate_t         last, rate;
     ivl_sim_contact_t      contact;

@@ -25,9 +25,33 @@ void ivl_sim_readings_init(const ivl_sim_model_t *model, const ivl_sim_rng_t *rn
             double n[4];
             ivl_sim_normal4(rng, sensor.draw_noise, UINT32_MAX, n);
             reading->bias = sensor.bias * n[0];
+            reading->scale = sensor.mean_norm + sensor.bias_norm * n[1];
             reading->next_s = ivl_sim_uniform(rng, IVL_SIM_DRAW_SENSOR_PHASE, 1u + (uint32_t)k) / sensor.rate_hz;
         }
     }
+}
+
+/// Normal numbers of a sample, which take after those of the sample before.                                            [MODEL eq. 13.19]
+static void correlate(double correlation, const double n[4], ivl_sim_reading_t *reading)
+{
+    const bool   first = reading->n_taken == 0 || !(correlation > 0.0);
+    const double kept = first ? 0.0 : correlation, fresh = first ? 1.0 : sqrt(1.0 - correlation * correlation);
+    for (int i = 0; i < 2; i++)
+    {
+        reading->noise[i] = first ? n[i] : kept * reading->noise[i] + fresh * n[i];
+    }
+}
+
+/// The error of a sample that has little to do with the truth; 0 for most.
+static double outlier(const ivl_sim_sensor_t *sensor, const ivl_sim_rng_t *rng, double value, uint32_t index)
+{
+    if (!(sensor->outlier > 0.0) || !(ivl_sim_uniform(rng, sensor->draw_outlier, index) < sensor->outlier))
+    {
+        return 0.0;
+    }
+    double n[4];
+    ivl_sim_normal4(rng, sensor->draw_outlier, UINT32_MAX - index, n);
+    return sensor->outlier_size * n[0] + sensor->outlier_norm * value * n[1];
 }
 
 static void take(const ivl_sim_sensor_t *sensor, const ivl_sim_rng_t *rng, double value, ivl_sim_reading_t *reading)
@@ -35,7 +59,10 @@ static void take(const ivl_sim_sensor_t *sensor, const ivl_sim_rng_t *rng, doubl
     const uint32_t i = reading->n_taken % IVL_SIM_READING_QUEUE;
     double         n[4];
     ivl_sim_normal4(rng, sensor->draw_noise, reading->n_taken, n);
-    value += reading->bias + sensor->noise * n[0] + sensor->noise_norm * value * n[1];
+    correlate(sensor->correlation, n, reading);
+    const double true_value = value, wild = outlier(sensor, rng, value, reading->n_taken);
+    value += reading->bias + sensor->noise * reading->noise[0] + sensor->noise_norm * value * reading->noise[1];
+    value += reading->scale * true_value + wild;
     if (sensor->resolution > 0.0)
     {
         value = sensor->resolution * floor(value / sensor->resolution + 0.5);

@@ -16,15 +16,20 @@ enum
 /// A sensor's numbers, in its own unit.
 typedef struct
 {
-    double         rate_hz;     ///< 0: there is none
-    double         delay_s;     ///< from the sampling instant to the arrival
-    double         noise;       ///< standard deviation: constant part
-    double         noise_norm;  ///< and part of the value
-    double         bias;        ///< standard deviation of the offset, drawn once a rollout
-    double         resolution;  ///< values are multiples of this; 0: not rounded
-    double         lo, hi;      ///< a value outside is told as invalid
-    double         drop_norm;   ///< chance that a sample is told as invalid
-    ivl_sim_draw_t draw_noise, draw_drop;
+    double         rate_hz;                     ///< 0: there is none
+    double         delay_s;                     ///< from the sampling instant to the arrival
+    double         noise;                       ///< standard deviation: constant part
+    double         noise_norm;                  ///< and part of the value
+    double         bias;                        ///< standard deviation of the offset, drawn once a rollout
+    double         bias_norm;                   ///< of an error that is a part of the value, drawn likewise
+    double         mean_norm;                   ///< mean error, part of the value
+    double         correlation;                 ///< of the noise of two samples in a row
+    double         outlier;                     ///< chance of a further error,
+    double         outlier_size, outlier_norm;  ///< whose standard deviation is the one, and the other part of the value
+    double         resolution;                  ///< values are multiples of this; 0: not rounded
+    double         lo, hi;                      ///< a value outside is told as invalid
+    double         drop_norm;                   ///< chance that a sample is told as invalid
+    ivl_sim_draw_t draw_noise, draw_drop, draw_outlier;
 } ivl_sim_sensor_t;
 
 /// A row: a sensor's name and unit, what it measures, its numbers, and the member of the core's input that it is told in.
@@ -50,8 +55,10 @@ typedef struct
     double   due_s[IVL_SIM_READING_QUEUE];  ///< instant of arrival
     double   value[IVL_SIM_READING_QUEUE];
     bool     valid[IVL_SIM_READING_QUEUE];
-    double   next_s;  ///< next sampling instant
-    double   bias;    ///< of this rollout
+    double   next_s;    ///< next sampling instant
+    double   bias;      ///< of this rollout
+    double   scale;     ///< likewise: error over value
+    double   noise[2];  ///< of the last sample, over its standard deviation: constant part, and part of the value
     uint32_t n_taken, n_delivered;
 } ivl_sim_reading_t;
 

@@ -497,6 +497,7 @@ ivl_sim_work_t IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_s
     ivl_sim_work_t  work = {0, 0};
     ivl_sim_group_init(model, &group);
     group.port = model->core.open(model->core.context);
+    group.eyes = (model->eye.context != NULL) ? model->eye.open(model->eye.context, IVL_SIM_LANES) : NULL;
     for (int lane = 0; lane < IVL_SIM_LANES; lane++)
     {
         refill(&group, lane, source, context, &job[lane]);
@@ -522,5 +523,9 @@ ivl_sim_work_t IVL_SIM_OF_WIDTH(ivl_sim_fly)(const ivl_sim_model_t *model, ivl_s
         }
     }
     model->core.close(group.port);
+    if (group.eyes != NULL)
+    {
+        model->eye.close(group.eyes);
+    }
     return work;
 }

@@ -191,6 +191,7 @@ void ivl_sim_world_start_from(ivl_sim_group_t *group, int lane, const ivl_sim_rn
     draw_scatter(w, &group->rotor, lane);
     draw_battery(w, &group->rotor, lane, start->battery_V);
     ivl_sim_sensors_init(model, rng, &kin, &w->sensors);
+    ivl_sim_sight_start(model, group->eyes, lane, rng, &w->sight);
     model->core.init(group->port, lane, &model->firmware, &w->firmware);
     // accelerations of the vehicle that was in this lane before must not reach the new one: what is no number would, even
     // through a step of no length

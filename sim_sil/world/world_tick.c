@@ -49,6 +49,7 @@ static bool decide(ivl_sim_group_t *group, int lane, ivl_reference_t *ref)
     ivl_sim_scene_t scene = {.model = model, .kin = &kin, .surface_height_m = ivl_sim_world_surface_m(group, lane)};
     ivl_d3_store(scene.a_W_mps2, ivl_w3_lane(&group->last.a_WB_mps2, lane));
     ivl_sim_sensors_read(&scene, &w->rng, t_s, &w->sensors, &w->in);
+    ivl_sim_sight_read(&scene, group->eyes, lane, &w->rng, t_s, w->firmware.phase <= IVL_PHASE_APPROACH, &w->sight, &w->in);
     if (model->core.has_autopilot)
     {
         model->core.step(group->port, lane, &model->firmware, &w->firmware, &w->in, &w->out);

@@ -43,11 +43,13 @@ def test_every_field_of_the_task_reaches_the_world_or_the_rollout() -> None:
         "vehicle": "crazyflie21", "gear": "wide_long", "gear_set": "table1", "sensing": "camera50",
         "estimator": "kalman", "approach": "constant_rrev", "surface": SurfaceChoice(angle_deg=135.0),
     }  # fmt: skip
-    assert set(changes) == set(EQUIPMENT)
+    assert {*changes, "texture"} == set(EQUIPMENT)
     digests = {task.make_world().params.digest()}
     digests |= {task.model_copy(update={name: value}).make_world().params.digest() for name, value in changes.items()}
-    assert len(digests) == 1 + len(changes)
-    rest = set(Task.model_fields) - set(changes)
+    looking = task.model_copy(update={"sensing": "aideck60"})
+    digests |= {looking.model_copy(update={"texture": name}).make_world().params.digest() for name in ("dots", "lines")}
+    assert len(digests) == 3 + len(changes)
+    rest = set(Task.model_fields) - set(changes) - {"texture"}
     assert rest == {"speed_mps", "angle_deg", "start", "overrides", "family"}
 
 

@@ -108,8 +108,8 @@ def test_pictures_that_are_there_give_the_same_readings() -> None:
 def test_wrong_numbers_are_refused() -> None:
     with pytest.raises(ArgumentError, match="no number 'zoom'"):
         native.Camera(zoom=2.0)
-    with pytest.raises(ArgumentError, match="focal_px = 1"):
-        native.Camera(focal_px=1.0)
+    with pytest.raises(ArgumentError, match="focal = 1"):
+        native.Camera(focal=1.0)
     with pytest.raises(ArgumentError, match="no surface 'sky'"):
         textures.make("sky")
     with pytest.raises(ArgumentError, match="18 numbers a row"):

@@ -187,7 +187,7 @@ def sequence(texture: str, seed: int, angle_deg: float = 50.0, n: int = 0, **cam
         times = np.array([row[0] * 1e6, 4000], dtype=np.uint32)
         frames.append((grey[i].tobytes(), times.tobytes(), axes.tobytes()))
     radial = (int(_fixed(np.array(camera["radial_1"]), 16)), int(_fixed(np.array(camera["radial_2"]), 16)))
-    return Sequence(int(camera["focal_px"] * 32768), radial, frames)
+    return Sequence(int(camera["focal"] * 32768), radial, frames)
 
 
 def play(estimator: Emulated | Host, seen: Sequence) -> tuple[list[bytes], list[int]]:

@@ -74,9 +74,14 @@ class Camera:
         return float(self.values[list(parameters()).index(name)])
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Its numbers by name."""
+        return tuple(parameters())
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of a picture."""
-        width = 320 if self["width_px"] > 240.0 else 160
+        width = 320 if self["width"] > 240.0 else 160
         return width * 3 // 4, width
 
 

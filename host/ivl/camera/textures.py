@@ -112,14 +112,14 @@ def from_picture(path: Path, length_m: float = LENGTH_M) -> Texture:
 
 
 @cache
-def make(name: str, seed: int = 0) -> Texture:
-    """A surface by its name, or of a picture file (`.png`, `.jpg`).
+def make(name: str, length_m: float = LENGTH_M, seed: int = 0) -> Texture:
+    """A surface by its name, or of a picture file (`.png`, `.jpg`), as a square of this side that repeats.
 
     Raises:
         ArgumentError: There is no surface of that name, and no such file.
     """
     if Path(name).suffix.lower() in (".png", ".jpg", ".jpeg"):
-        return from_picture(Path(name))
+        return from_picture(Path(name), length_m)
     if name not in TEXTURES:
         raise ArgumentError(f"no surface {name!r}: {', '.join(TEXTURES)}, or a picture (.png)")
-    return Texture(TEXTURES[name](np.random.default_rng([seed, list(TEXTURES).index(name)])), LENGTH_M)
+    return Texture(TEXTURES[name](np.random.default_rng([seed, list(TEXTURES).index(name)])), length_m)

@@ -1,13 +1,18 @@
 """`ivl camera`."""
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
-from ivl.camera import study
+from ivl import files
+from ivl.camera import fit, rates, study
 from ivl.cli import console
+from ivl.cli.task_options import Chosen, task_options
+from ivl.errors import ConfigError
+from ivl.world import World
 
 app = typer.Typer(no_args_is_help=True, help="The onboard camera: how well it sees a surface.")
 
@@ -36,6 +41,101 @@ def table(
     else:
         console.out.print(_drawn(rows))
     return 1 if any(row.failed for row in rows) else 0
+
+
+FIT_HELP = """Fly approaches with rendered pictures, and fit the noise model of a sensor set to their readings.
+
+The speeds are 1.5 to 3.5 m/s, the angles 30 to 90 degrees. The file is a sensor set: `--sensing FILE.yaml` flies it.
+
+\b
+Examples:
+  ivl camera fit --sensing aideck60 --texture panels
+      the model's numbers
+  ivl camera fit --sensing aideck60 --texture wall.png --out wall_model.yaml
+      a sensor set for a surface of your own
+"""
+
+
+@app.command("fit", help=FIT_HELP, short_help="Fit a noise model to readings of rendered pictures.")
+@task_options("vehicle", "gear", "gear_set", "sensing", "texture", "estimator", sensing="aideck60")
+def fit_command(
+    chosen: Chosen,
+    approaches: Annotated[int, typer.Option(help="Approaches that are flown.", min=10)] = 60,
+    seed: Annotated[int, typer.Option(help="Seed of approaches and noise.", min=0)] = 1,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.yaml", help="Write a sensor set with the model.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Fit; FIT_HELP is the text that people see."""
+    if out is not None and out.suffix != ".yaml":
+        raise ConfigError(f"--out {out}: a sensor set is a file .yaml")
+    world = _looking(chosen)
+    model = fit.of_world(world, approaches, seed)
+    if out is not None:
+        name = out.stem
+        what = f"--sensing {world.sensing} --texture {world.texture}"
+        source = f"ivl camera fit {what} --approaches {approaches} --seed {seed}"
+        doc = f"Noise model of {world.sensing} over {world.texture}, fitted to rendered readings; no pictures."
+        try:
+            with files.replacing(out) as part:
+                part.write_text(fit.as_yaml(model, name, doc, source, world), encoding="utf-8")
+        except OSError as error:
+            raise ConfigError(f"--out {out}: cannot be written: {files.reason(error)}") from error
+    if as_json:
+        console.print_json({"readings": model.n, "numbers": model.numbers, "standard_errors": model.sigma})
+        return
+    console.out.print(f"{model.n} readings of {approaches} approaches")
+    for name, value in model.numbers.items():
+        spread = f" +- {model.sigma[name]:.2g}" if name in model.sigma else ""
+        console.out.print(f"rrev.{name:14s} {value:.5g}{spread}")
+
+
+LANDINGS_HELP = """How often pictures land, and how often their noise model does.
+
+A threshold and a moment are chosen from a grid with the model alone; then both are flown with other random numbers.
+
+\b
+Examples:
+  ivl camera landings --sensing aideck60 --texture panels --model aideck60_panels
+"""
+
+
+@app.command("landings", help=LANDINGS_HELP, short_help="Compare landing rates of pictures and of their noise model.")
+@task_options("vehicle", "gear", "gear_set", "sensing", "texture", "estimator", "speed_mps", "angle_deg",
+              sensing="aideck60", gear_set="as_simulated")  # fmt: skip
+def landings(
+    chosen: Chosen,
+    model: Annotated[str, typer.Option(help="Sensor set with the noise model.")],
+    rollouts: Annotated[int, typer.Option(help="Landings of each.", min=10)] = 400,
+    seed: Annotated[int, typer.Option(help="Seed of the landings that are judged.", min=1)] = 2,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Compare; LANDINGS_HELP is the text that people see."""
+    world = _looking(chosen)
+    setup, gear = chosen.setup()
+    modelled = setup.model_copy(update={"sensing": model, "texture": None}).world_of(gear)
+    speed, angle = chosen.given.get("speed_mps", 2.5), chosen.given.get("angle_deg", 90.0)
+    result = rates.compare(world, modelled, speed, angle, rollouts, seed)
+    if as_json:
+        console.print_json(asdict(result))
+        return
+    console.out.print(
+        f"policy chosen with the model: RREV_c {result.rrev_c_per_s:.2f} 1/s, M_yd {result.moment_Nmm:g} N mm"
+    )
+    for what, rate in (("pictures", result.pictures), ("model", result.model)):
+        spread = (rate * (1.0 - rate) / rollouts) ** 0.5
+        console.out.print(f"{what:9s} {100 * rate:5.1f} % +- {100 * spread:.1f} land on four feet")
+
+
+def _looking(chosen: Chosen) -> World:
+    """The world, which has a camera.
+
+    Raises:
+        ConfigError: It has none.
+    """
+    world = chosen.make_world()
+    if not world.params.values["camera.rate"] > 0.0:
+        raise ConfigError(f"--sensing {world.sensing}: there is no camera that takes pictures; aideck60 has one")
+    return world
 
 
 def _drawn(rows: list[study.Figures]) -> Table:

@@ -1,6 +1,7 @@
 """`ivl rollout`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +11,7 @@ from pydantic import BaseModel
 
 from ivl import forms, outcome, tracefile, yamlfile
 from ivl.api.runs import LearnRun, load
+from ivl.camera import video
 from ivl.cli import console, policy_options
 from ivl.cli.task_options import EQUIPMENT, FLAGS, Chosen, task_options
 from ivl.errors import ConfigError
@@ -34,10 +36,19 @@ Examples:
       the landing that an experiment learns; without it the legs are those of table1, which were built and flown
   ivl rollout --run runs/paper_vertical-ephe-seed0 --plot landing.png
       what a run has learned, on the vehicle, gear and approach that it flew
+  ivl rollout --sensing aideck60 --texture panels --plot p.png --frames f.mp4
+      pictures of panels in the loop, and a video of what the camera saw; with a sensor set, and nothing said of
+      approach and policy, the landing of experiments/onboard_camera.yaml
   ivl rollout --policy g.yaml --speed 1.2 --angle 35 --plot landing.png
       a policy for every approach (ivl policy learn), on what it was learned on, unless other options say otherwise; if
       it calls the approach off, the verdict says no_go, and the picture shows how the vehicle levels out
 """
+
+
+SHOWN: dict[str, Any] = {"gear_set": "as_simulated", "speed_mps": 2.5, "angle_deg": 90.0, "start": "flown"}
+SHOWN_POLICY = (5.05, 10.65)
+"""What is flown if neither approach nor policy is said: the landing of experiments/onboard_camera.yaml, and a threshold
+(1/s) and a moment (N mm) with which pictures land it (docs/CAMERA.md)."""
 
 
 @task_options(*EQUIPMENT, "speed_mps", "angle_deg", "start")
@@ -57,17 +68,21 @@ def rollout(
     stream: Annotated[int, typer.Option(help="Number of the rollout within the seed.", min=0)] = 0,
     trace: Annotated[Path | None, typer.Option(help="Write the time series to FILE (.csv or .npz).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the landing into FILE (.png, .svg or .pdf).")] = None,
+    frames: Annotated[
+        Path | None,
+        typer.Option(help="Write what a rendered camera saw, slowed down: .mp4, .gif; .npz for ivl camera bench."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Fly one landing; HELP is the text that people see."""
-    if trace:
-        tracefile.check_suffix(trace)
-    if plot and plot.suffix not in (".png", ".svg", ".pdf"):
-        raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
+    _check_files(trace, plot, frames)
     said = {"form": form, "theta": theta, "rrev": rrev, "moment": moment}
     learned = policy_options.load(policy_file, **said)
     if run_folder is not None:
         policy_options.only("--run", run_folder, policy=policy_file, experiment=chosen.path, **said)
+    if _shown(chosen, policy_file, run_folder, **said):
+        chosen = replace(chosen, given={**SHOWN, **chosen.given})
+        rrev, moment = SHOWN_POLICY
     name = form or forms.PAPER
     bases: Sequence[BaseModel] = ()
     if run_folder is not None:
@@ -80,19 +95,44 @@ def rollout(
         policy = {"form": name, "theta": policy_options.theta_of(name, theta, rrev, moment)}
     numbers = {"seed": seed, "stream": stream, "d_ceil_m": distance}
     data = chosen.fields(*bases)
-    for name in ("speed_mps", "angle_deg"):
-        if name not in data:
-            raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")
-    world, flight = yamlfile.validate(LandingSpec, {**data, **policy, **numbers}, "options").fly()
+    _check_approach(data)
+    spec = yamlfile.validate(LandingSpec, {**data, **policy, **numbers}, "options")
+    world, flight = spec.fly()
+    seen = spec.film(world) if frames else None
     if trace:
         tracefile.write(trace, flight.rows)
     if plot:
         _draw(world, flight, plot)
+    if frames and seen:
+        video.save(seen, frames)
     result = _result(world, flight)
     if as_json:
         console.print_json(result)
     else:
         _report(result)
+
+
+def _shown(chosen: Chosen, policy_file: Path | None, run_folder: Path | None, **said: object) -> bool:
+    """Whether nothing was said of approach and policy, so that the landing that shows pictures is meant."""
+    camera = chosen.given.get("sensing")
+    quiet = [policy_file, run_folder, chosen.path, *said.values(), *map(chosen.given.get, ("speed_mps", "angle_deg"))]
+    return camera is not None and all(value is None for value in quiet)
+
+
+def _check_files(trace: Path | None, plot: Path | None, frames: Path | None) -> None:
+    """Refuse files whose kind is unknown, before anything is flown."""
+    if trace:
+        tracefile.check_suffix(trace)
+    if plot and plot.suffix not in (".png", ".svg", ".pdf"):
+        raise ConfigError(f"--plot {plot}: unknown kind of file (allowed .png, .svg, .pdf)")
+    if frames:
+        video.check_suffix(frames)
+
+
+def _check_approach(data: dict[str, Any]) -> None:
+    for name in ("speed_mps", "angle_deg"):
+        if name not in data:
+            raise ConfigError(f"{FLAGS[name][0]} is missing (or --experiment, which has it)")
 
 
 def _of_run(folder: Path) -> LandingSpec:

@@ -32,6 +32,7 @@ FLAGS: dict[str, tuple[str, ...]] = {
     "gear": ("--gear",),
     "gear_set": ("--gear-set",),
     "sensing": ("--sensors", "--sensing"),
+    "texture": ("--texture",),
     "estimator": ("--estimator",),
     "approach": ("--approach",),
     "speed_mps": ("--speed",),
@@ -40,7 +41,7 @@ FLAGS: dict[str, tuple[str, ...]] = {
     "start": ("--start",),
 }
 """Options of each field; a new field of the task needs a row here."""
-EQUIPMENT = ("vehicle", "gear", "gear_set", "sensing", "estimator", "approach", "surface")
+EQUIPMENT = ("vehicle", "gear", "gear_set", "sensing", "texture", "estimator", "approach", "surface")
 """Fields that make a world."""
 _KINDS = {"speed_mps": float, "angle_deg": float, "surface": float}
 _LABEL = "options"  # the file that errors name where there is none
