@@ -32,7 +32,7 @@ _HUGE = 1e30
 _NORM_SLACK = 0.1
 _SHOWN = 40
 _NPZ_BYTES_MAX = 2**30
-_NPZ_ERRORS = (ValueError, OSError, EOFError, LookupError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error)
+NPZ_ERRORS = (ValueError, OSError, EOFError, LookupError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error)
 """What numpy and zipfile raise for damaged archives; NotImplementedError is a RuntimeError."""
 _MAGIC = {
     b"\x1f\x8b": "is compressed (gzip): unpack it first",
@@ -276,7 +276,7 @@ def read_npz(path: Path) -> Table:
             raise ConfigError(f"{path}: unpacks to {size} bytes (allowed {_NPZ_BYTES_MAX})")
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-    except _NPZ_ERRORS as error:
+    except NPZ_ERRORS as error:
         raise ConfigError(f"{path}: is no archive of numpy arrays: {shorten(str(error), 100)}") from error
     return _of_arrays(path, arrays)
 
