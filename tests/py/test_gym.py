@@ -131,7 +131,7 @@ def test_the_vector_form_is_many_single_ones() -> None:
     [
         (lambda: LandingEnv("paper_vertcal"), "did you mean 'paper_vertical'"),
         (lambda: LandingEnv(speed_mps=(3.0, 2.0)), "speed_mps: 3 .. 2 is not in order"),
-        (lambda: LandingEnv(angle_deg=95.0), "angle_deg: value 95.0 is out of range"),
+        (lambda: LandingEnv(angle_deg=195.0), "angle_deg: value 195.0 is out of range"),
         (lambda: LandingEnv(reward="papr"), "no reward 'papr'"),
         (lambda: LandingEnv().reset(options={"sped": 1.0}), "no option 'sped'"),
         (lambda: LandingVectorEnv(2).reset(options={"speed_mps": 1.0}), "there are none here"),

@@ -649,7 +649,7 @@ def test_what_an_assessment_draws_or_cannot_fly_is_not_set(
 def test_the_help_of_an_assessment_says_what_is_flown_unless_told(capsys: Capture) -> None:
     assert cli.run(["policy", "assess", "--help"]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    assert text.count("default: as it was learned") == 7
+    assert text.count("default: as it was learned") == 9
     assert "default: habas2021" not in text
     assert "trigger" not in text
 

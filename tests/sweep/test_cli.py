@@ -43,9 +43,9 @@ def test_wrong_files_and_folders_are_one_line(tmp_path: Path, capsys: pytest.Cap
 def test_what_is_out_of_range_is_told_by_field_and_range_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = write(tmp_path / "sweep.yaml", {**SMALL, "angles_deg": [30.0, 100.0]})
+    file = write(tmp_path / "sweep.yaml", {**SMALL, "angles_deg": [30.0, 200.0]})
     assert cli.run(["sweep", str(file)]) == 2
-    assert capsys.readouterr().err == "ivl: sweep.yaml: angles_deg: 100.0 is out of range (0 .. 90 deg)\n"
+    assert capsys.readouterr().err == "ivl: sweep.yaml: angles_deg: 200.0 is out of range (0 .. 180 deg)\n"
 
 
 def test_a_run_that_is_complete_is_summed_up_for_people(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -34,7 +34,7 @@ def test_the_shipped_map_loads() -> None:
     [
         ({"speeds_mps": [2.5, 2.5]}, "speeds_mps: a value is given twice"),
         ({"speeds_mps": [2.5, 60.0]}, r"speeds_mps: 60\.0 is out of range \(0\.1 \.\. 6 m/s\)"),
-        ({"angles_deg": {"first": 0.0, "last": 120.0, "count": 3}}, r"angles_deg: 120\.0 is out of range"),
+        ({"angles_deg": {"first": 0.0, "last": 220.0, "count": 3}}, r"angles_deg: 220\.0 is out of range"),
         ({"budget": 31}, "budget 31 is not a multiple of n_rollouts 6"),
         ({"learner": {"name": "nobody"}}, "no learner 'nobody'"),
         ({"mu0_range": {"rrev_c_per_s": [1.0, 8.0], "moment_y_Nmm": [3.0, 8.0]}}, "must lie in order inside"),

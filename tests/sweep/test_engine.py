@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import time
+import urllib.error
+import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -222,6 +224,11 @@ def test_a_local_cluster_is_its_owner_s_alone() -> None:
         address = client.scheduler.address
         assert address.startswith("tls://127.0.0.1:")
         assert client.cluster.dashboard_link in ("", None) or "http" not in str(client.scheduler_info()["services"])
+        with cluster.open_client(None, 1):  # a second one on this machine disturbs nothing
+            pages = client.cluster.scheduler.http_server
+        for path in ("health", "info/main/workers.html", "json/counts.json", "metrics", "statics/css/base.css", ""):
+            with pytest.raises(urllib.error.HTTPError, match="404"):
+                urllib.request.urlopen(f"http://127.0.0.1:{pages.port}/{path}", timeout=DEADLINE_S)
         code = (
             "import sys, distributed\n"
             "distributed.Client(sys.argv[1], timeout=3, security=distributed.Security.temporary())\n"

@@ -86,6 +86,10 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+_NO_PAGES = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+"""Dask tells whoever asks by HTTP what a cluster does, without a certificate: nothing is told."""
+
+
 def default_workers() -> int:
     """Processes on this machine where nobody says how many: one per processor, as far as there is memory."""
     return max(min(processors(), _memory_bytes() // WORKER_BYTES), 1)
@@ -108,10 +112,13 @@ def _local(workers: int | None) -> Any:
     level = logger.level
     logger.setLevel(logging.CRITICAL + 1)  # what goes wrong at the start is said once, below
     try:
-        cluster = _dask.LocalCluster(
-            n_workers=n, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
-            security=_security(),
-        )  # fmt: skip
+        with dask.config.set(_NO_PAGES):
+            cluster = _dask.LocalCluster(
+                n_workers=n, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
+                # Dask opens a port for pages without a dashboard, too: one that is free, or a second sweep meets it
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
+                security=_security(),
+            )  # fmt: skip
     except Exception as error:  # Dask ends in a failed assertion, too, where a process cannot be had
         what = " ".join(str(error).split())[:200] or type(error).__name__
         cannot = f"{n} workers cannot be started: {what}"
@@ -164,9 +171,10 @@ def _slurm(workers: int | None) -> Any:
     except ImportError as error:
         raise ConfigError("--scheduler slurm: dask-jobqueue is not installed (extra `cluster`)") from error
     try:
-        cluster = jobqueue.SLURMCluster(
-            security=_security(), shared_temp_directory=_shared_folder(), scheduler_options={"dashboard": False}
-        )
+        with dask.config.set(_NO_PAGES):
+            cluster = jobqueue.SLURMCluster(
+                security=_security(), shared_temp_directory=_shared_folder(), scheduler_options={"dashboard": False}
+            )
     except ValueError as error:
         raise ConfigError(f"--scheduler slurm: jobqueue.slurm in Dask's configuration: {error}") from error
     cluster.scale(workers)
