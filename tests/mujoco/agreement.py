@@ -46,25 +46,31 @@ class Landing:
         return {name: getattr(self, name) for name in ARGUMENTS}
 
 
-def draw(n: int, seed: int) -> list[Landing]:
-    """`n` landings, uniform over the ranges of the paper and over the twelve gears."""
+def draw(
+    n: int,
+    seed: int,
+    speeds_mps: tuple[float, float] = (0.5, 4.0),
+    angles_deg: tuple[float, float] = (20.0, 90.0),
+    moments_Nmm: tuple[float, float] = (3.0, 11.0),
+) -> list[Landing]:
+    """`n` landings, uniform over ranges, those of the paper unless told, and over the twelve gears."""
     rng = np.random.default_rng(seed)
     gears = [(s, g) for s in GEAR_SETS for g in model.list_gears(s)]
     result = []
     for i in range(n):
-        speed, angle = rng.uniform(0.5, 4.0), rng.uniform(20.0, 90.0)
-        rrev, moment = rng.uniform(2.0, 7.0), rng.uniform(3.0, 11.0)
+        speed, angle = rng.uniform(*speeds_mps), rng.uniform(*angles_deg)
+        rrev, moment = rng.uniform(2.0, 7.0), rng.uniform(*moments_Nmm)
         result.append(Landing(*gears[i % len(gears)], speed, angle, rrev, moment, stream=i))
     return result
 
 
-def split(landings: Sequence[Landing]) -> tuple[list[Landing], list[Landing]]:
-    """Those that touch the ceiling and those that do not, in order, as the project's simulator has it."""
+def split(landings: Sequence[Landing], **overrides: float) -> tuple[list[Landing], list[Landing]]:
+    """Those that touch the surface and those that do not, in order, as the project's simulator has it."""
     hits = np.zeros(len(landings), dtype=bool)
     for key in {(a.gear_set, a.gear) for a in landings}:
         chosen = [i for i, a in enumerate(landings) if (a.gear_set, a.gear) == key]
         columns = [[getattr(landings[i], name) for i in chosen] for name in ARGUMENTS]
-        out = ivl.World("habas2021", key[1], key[0]).rollouts(*columns[:4], stream=columns[4])
+        out = ivl.World("habas2021", key[1], key[0], **overrides).rollouts(*columns[:4], stream=columns[4])
         hits[chosen] = np.isfinite(out.t_impact_s)
     return [a for a, hit in zip(landings, hits, strict=True) if hit], [
         a for a, hit in zip(landings, hits, strict=True) if not hit
@@ -116,7 +122,7 @@ def undecided(landing: Landing, seed: int = 0, **overrides: float) -> float:
     factor = 1.0 + VARIANT_SHARE * rng.uniform(-1.0, 1.0, (3, VARIANTS))
     out = world.rollouts(
         landing.speed_mps * factor[0],
-        np.minimum(landing.angle_deg * factor[1], 90.0),
+        np.minimum(landing.angle_deg * factor[1], 90.0 if landing.angle_deg <= 90.0 else 180.0),
         landing.rrev_c_per_s,
         landing.moment_y_Nmm * factor[2],
         stream=landing.stream,

@@ -12,6 +12,7 @@ import mjcf
 import mujoco
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 import ivl
 from ivl.world import Trace
@@ -147,6 +148,9 @@ class Engine:
         self.model.pair_solref[:] = mjcf.plate_reference(p, float(self.model.body_invweight0[airframe, 0]))
         self.model.eq_solimp[:, :2] = 0.9999
         self.data = mujoco.MjData(self.model)
+        self._R_SW = mjcf.turn_SW(p)
+        self._point_m = np.array([0.0, 0.0, p["world.ceiling_height"]])  # of the surface, in both frames
+        self._turn_deg = 180.0 - p["surface.angle"]  # a level vehicle is so much nose-up as seen from the surface
         self._law = [0.0] * 8
         if plates == "same_law":
             self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
@@ -175,9 +179,9 @@ class Engine:
         """Place the vehicle as the first row of `trace` has it: legs at rest."""
         first = trace.rows[0]
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:3] = first.p_WB_m
-        self.data.qpos[3:7] = np.roll(first.q_WB, 1)
-        self.data.qvel[:3] = first.v_WB_mps
+        self.data.qpos[:3] = self._R_SW @ (first.p_WB_m - self._point_m) + self._point_m
+        self.data.qpos[3:7] = np.roll((Rotation.from_matrix(self._R_SW) * Rotation.from_quat(first.q_WB)).as_quat(), 1)
+        self.data.qvel[:3] = self._R_SW @ first.v_WB_mps
         self.data.qvel[3:6] = first.w_B_radps
         self.data.userdata[:] = self._law
 
@@ -192,7 +196,19 @@ class Engine:
         result = Output()
         self.reset(trace)
         run(self, given, result, rows.ctypes.data)
-        return _flight(result, rows)
+        return self._in_world(_flight(result, rows))
+
+    def _in_world(self, flight: Flight) -> Flight:
+        """A flight in the world's axes; MuJoCo has it in those of the surface."""
+        back = self._R_SW.T
+        return replace(
+            flight,
+            theta_impact_deg=flight.theta_impact_deg - self._turn_deg,
+            p_m=(flight.p_m - self._point_m) @ self._R_SW + self._point_m,
+            q_xyzw=(Rotation.from_matrix(back) * Rotation.from_quat(flight.q_xyzw)).as_quat(),
+            v_mps=flight.v_mps @ self._R_SW,
+            feet_m=(flight.feet_m - self._point_m) @ self._R_SW + self._point_m,
+        )
 
 
 def run(engine: Engine, given: Input, result: Output, rows: int | None) -> None:

@@ -53,7 +53,7 @@ def build(p: Mapping[str, float]) -> str:
     pairs = "".join(_contact(p, name) for name in ("prop_plate", "base_plate"))
     return f"""<mujoco>
   <compiler angle="radian" inertiafromgeom="false"/>
-  <option gravity="0 0 {-p["world.gravity"]!r}" integrator="RK4" cone="elliptic" solver="Newton" tolerance="1e-14"/>
+  <option gravity="{_text(gravity_S(p))}" integrator="RK4" cone="elliptic" solver="Newton" tolerance="1e-14"/>
   <size nuserdata="8"/>
   <default><geom contype="0" conaffinity="0"/></default>
   <worldbody>
@@ -70,6 +70,21 @@ def build(p: Mapping[str, float]) -> str:
   <equality>{feet}</equality>
   <actuator>{"".join(_thrust(p, i) for i in range(4))}</actuator>
 </mujoco>"""
+
+
+def turn_SW(p: Mapping[str, float]) -> Vector:
+    """Rotation from the world's axes to those of the surface, whose z is its normal; MuJoCo's world has the latter."""
+    theta = math.radians(p["surface.angle"])
+    normal, forward = (
+        np.array([math.sin(theta), 0.0, -math.cos(theta)]),
+        np.array([-math.cos(theta), 0.0, -math.sin(theta)]),
+    )
+    return np.array([forward, np.cross(normal, forward), normal])
+
+
+def gravity_S(p: Mapping[str, float]) -> Vector:
+    """Gravity in the axes of the surface."""
+    return turn_SW(p) @ np.array([0.0, 0.0, -p["world.gravity"]])
 
 
 def rest_direction(p: Mapping[str, float], leg: int) -> Vector:

@@ -18,7 +18,7 @@ import ivl
 from ivl.world import Trace
 
 FINE = {"step.scale": 0.1}
-N_TOUCHING, N_MISSES, N_FINE, N_NATIVE = 300, 36, 96, 96
+N_TOUCHING, N_MISSES, N_FINE, N_NATIVE, N_TILTED = 300, 36, 64, 64, 24
 
 
 def _fly(world: ivl.World, **arguments: Any) -> tuple[Trace, Flight]:
@@ -200,6 +200,26 @@ def test_random_landings_agree_with_contact_of_mujoco_itself() -> None:
     assert (r.n_legs != r.n_legs_mj).mean() < 0.05
     assert r.dp_m[r.clean].max() < 1.5e-3
     assert np.median(r.dp_m[:, 0]) < 3e-3
+
+
+@pytest.mark.parametrize("angle_deg", [135.0, 90.0, 45.0])
+def test_random_landings_on_surfaces_of_other_angles_agree(angle_deg: float) -> None:
+    """An overhang, a wall and a slope; MuJoCo has its own gravity and axes for each."""
+    surface = {"surface.angle": angle_deg}
+    drawn = agreement.draw(3 * N_TILTED, int(angle_deg), (1.5, 3.5), (30.0, 150.0), (0.5, 8.0))
+    touching = agreement.split(drawn, **surface)[0][:N_TILTED]
+    assert len(touching) == N_TILTED
+    r = agreement.compare(touching, "same_law", **surface)
+    differ = np.flatnonzero(r.n_legs != r.n_legs_mj)
+    assert (r.n_legs >= 3).sum() >= N_TILTED // 10
+    assert all(agreement.undecided(touching[i], **surface) > 0.0 for i in differ)
+    assert len(differ) <= 0.05 * N_TILTED
+    assert r.hit_mj.all()
+    assert np.abs(r.dt_impact_s).max() < 1e-4
+    assert np.abs(r.dtheta_impact_deg).max() < 0.2
+    assert np.median(np.abs(r.dt_impact_s)) < 2e-5  # rotors that are told to push feel the steps of MuJoCo for longer
+    assert (r.plate == r.plate_mj).mean() >= 0.95
+    assert (np.median(r.dp_m, axis=0) < [6e-4, 1.2e-3, 2e-3]).all()
 
 
 def test_misses_are_misses_in_both() -> None:
