@@ -168,8 +168,8 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 
 ##@ Tests
 
-# Three at a time, since links and browsers wait a lot: the first compile while pip waits for its downloads, then the longest come first.  Stages
-# that compile into one folder are ordered by their prerequisites.  test-wire flies in real time, beside stages of one process each.
+# Two at a time: the first compile while pip waits for its downloads, then the longest come first.  Stages that compile into one folder are
+# ordered by their prerequisites.  test-wire flies in real time, beside stages of one process each.
 TESTS := setup-dev test-c golden lint test-py pil test-links san test-mutants test-mujoco test-sil test-sweep test-report test-forms \
          sizes-diff test-analysis test-flight test-vision
 QUIET := docs notebook test-physics
@@ -177,8 +177,8 @@ QUIET := docs notebook test-physics
 .PHONY: test
 test: ## everything below, set-up and compilers included
 	@tools/apt_install.sh $(TOOLCHAIN) $(CPP) $(CROSS_TOOLCHAIN) $(VISION_TOOLCHAIN) $(FUZZER) $(QT_LIBRARIES) $(CHROMIUM) $(OPENSCAD)
-	$(say) 'test: three at a time, each printed when it is over'
-	@+$(MAKE) --no-print-directory -j3 -Otarget SIDE_BY_SIDE=1 $(TESTS)
+	$(say) 'test: two at a time, each printed when it is over'
+	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 $(TESTS)
 	@+$(MAKE) --no-print-directory -j2 -Otarget SIDE_BY_SIDE=1 test-wire test-quiet
 	$(say) 'test: everything passed'
 
