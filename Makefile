@@ -170,8 +170,8 @@ sizes-update: setup-dev build firmware ## accept the present figures (in a commi
 
 # Two at a time: the first compile while pip waits for its downloads, then the longest come first.  Stages that compile into one folder are
 # ordered by their prerequisites.  test-wire flies in real time, beside stages of one process each.
-TESTS := setup-dev test-c golden lint test-py pil test-links san test-mutants test-mujoco test-sil test-sweep test-report test-forms \
-         sizes-diff test-analysis test-flight test-vision
+TESTS := setup-dev test-c golden lint test-py pil test-links san test-forms test-sil test-mutants test-sweep test-report sizes-diff \
+         test-mujoco test-analysis test-flight test-vision
 QUIET := docs notebook test-physics
 
 .PHONY: test
