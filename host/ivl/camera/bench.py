@@ -10,8 +10,6 @@ Axes of the surface: x forward along it, y left, z into it; so the distance is -
 into these axes; their components stand in the order x, y, z, w.
 """
 
-import io
-import zipfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +31,7 @@ _TRUE = ("t_s", "p_x_m", "p_y_m", "p_z_m", "q_x", "q_y", "q_z", "q_w", "v_x_mps"
 _TOLD = ("told_q_x", "told_q_y", "told_q_z", "told_q_w")
 COLUMNS = ("file", *_TRUE, *_TOLD)
 """Columns of `frames.csv`: the picture, the middle of its exposure, true place, attitude and velocity of the vehicle,
-and the attitude that the estimator is told."""
+and the attitude that the estimator gets."""
 _FILES_MAX_BYTES = 2**30
 _LEAST = 3  # pictures: the first pair has nothing to compare with
 _NORM_SLACK = 0.1
@@ -97,7 +95,7 @@ def model(films: Sequence[Film]) -> fit.Model:
 def _of_file(path: Path) -> tuple[Camera, Grey, Rows]:
     if path.suffix != ".npz":
         raise ConfigError(f"{path}: is no sequence of pictures (allowed: a folder with {TABLE}, or a file .npz)")
-    arrays = _arrays(path)
+    arrays = table.read_arrays(path)
     for name in ("pictures", "rows"):
         if name not in arrays:
             raise ConfigError(f"{path}: array {name!r} is missing; there are {table.shorten(', '.join(arrays), 100)}")
@@ -114,19 +112,6 @@ def _of_file(path: Path) -> tuple[Camera, Grey, Rows]:
         if value.shape != () or value.dtype.kind not in "iuf":
             raise ConfigError(f"{path}: camera_{name}: must be one number")
     return _camera(path, {name: float(value) for name, value in numbers.items()}), pictures, _unit(path, rows)
-
-
-def _arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
-    data = table.read_bytes(path)
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-        if size > _FILES_MAX_BYTES:
-            raise ConfigError(f"{path}: unpacks to {size} bytes (allowed {_FILES_MAX_BYTES})")
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except table.NPZ_ERRORS as error:
-        raise ConfigError(f"{path}: is no archive of numpy arrays: {table.shorten(str(error), 100)}") from error
 
 
 def _of_folder(folder: Path) -> tuple[Camera, Grey, Rows]:

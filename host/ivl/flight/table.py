@@ -32,7 +32,7 @@ _HUGE = 1e30
 _NORM_SLACK = 0.1
 _SHOWN = 40
 _NPZ_BYTES_MAX = 2**30
-NPZ_ERRORS = (ValueError, OSError, EOFError, LookupError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error)
+_NPZ_ERRORS = (ValueError, OSError, EOFError, LookupError, TypeError, RuntimeError, zipfile.BadZipFile, zlib.error)
 """What numpy and zipfile raise for damaged archives; NotImplementedError is a RuntimeError."""
 _MAGIC = {
     b"\x1f\x8b": "is compressed (gzip): unpack it first",
@@ -261,24 +261,31 @@ def read_csv(path: Path) -> Table:
     return make_table(path, header_of(path, rows[0]), rows[1:])
 
 
-def read_npz(path: Path) -> Table:
-    """An archive of numpy arrays; vectors become a column for each component: "pos_1", "pos_2" ...
+def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """The arrays of an archive, whatever they are; nothing in it is run.
 
     Raises:
-        ConfigError: It is none, it is too large, or its arrays are no numbers of one length.
+        ConfigError: It is no archive of numpy arrays, or it is too large.
     """
     data = read_bytes(path)
-    arrays = {}
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             size = sum(member.file_size for member in archive.infolist())
         if size > _NPZ_BYTES_MAX:
             raise ConfigError(f"{path}: unpacks to {size} bytes (allowed {_NPZ_BYTES_MAX})")
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except NPZ_ERRORS as error:
+            return {name: archive[name] for name in archive.files}
+    except _NPZ_ERRORS as error:
         raise ConfigError(f"{path}: is no archive of numpy arrays: {shorten(str(error), 100)}") from error
-    return _of_arrays(path, arrays)
+
+
+def read_npz(path: Path) -> Table:
+    """An archive of numpy arrays; vectors become a column for each component: "pos_1", "pos_2" ...
+
+    Raises:
+        ConfigError: It is none, it is too large, or its arrays are no numbers of one length.
+    """
+    return _of_arrays(path, read_arrays(path))
 
 
 def _of_arrays(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> Table:
