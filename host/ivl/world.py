@@ -320,15 +320,13 @@ class World:
         **named: float,
     ) -> Trace:
         """Fly one rollout and record it every `period_s` seconds (arguments and errors as `rollouts`, scalars only)."""
-        specs, shape, _ = self._specs(
-            start, stream, state, form, theta, named,
-            speed_mps=speed_mps, angle_deg=angle_deg, d_ceil_m=d_ceil_m, seed=seed, flip_at_s=flip_at_s,
+        spec = self.specification(
+            speed_mps, angle_deg, *theta, form=form, seed=seed, start=start, d_ceil_m=d_ceil_m, stream=stream,
+            state=state, flip_at_s=flip_at_s, **named,
         )  # fmt: skip
-        if shape != ():
-            raise ArgumentError(f"trace: the arguments must be scalars, they broadcast to {shape}")
         if not (np.isfinite(period_s) and 1e-5 <= period_s <= 1.0):
             raise ArgumentError(f"trace: period_s: value {period_s!r} is out of range (allowed 1e-05 .. 1 s)")
-        rows, outcome = self._native.trace(specs(slice(0, 1)), period_s)
+        rows, outcome = self._native.trace(spec, period_s)
         return Trace(rows.view(Rows), outcome.view(np.recarray)[0])
 
     def specification(
